@@ -46,9 +46,9 @@ class StepCheck:
     """How far a run and the same with a quarter of the step tolerance are apart."""
 
     what: str  #: What the analysis measures, in words.
-    #: Largest difference of what is measured at the same parameter, as a fraction of what is measured there, or of
-    #: ``LEAST_REACTION`` times the first where that is more; nan where only the state at rest, which takes no steps, is
-    #: in both.
+    #: Largest difference of what is measured at the same parameter, or of the largest multipliers of pushovers, as a
+    #: fraction of what is measured there, or of ``LEAST_REACTION`` times the first where that is more; nan where only
+    #: the state at rest, which takes no steps, is in both.
     difference: float
     at: float  #: [m or rad] Parameter where it is.
     unit: str  #: Of the parameter.
@@ -204,7 +204,11 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
     mine, theirs = ours.same_places(other)
     stepped = (ours.phases[mine] > 0) | (ours.parameters[mine] != 0.0)
     mine, theirs = mine[stepped], theirs[stepped]
-    a, b = ours.measured[mine], other.measured[theirs]
+    places = mine, theirs
+    if response.measured == mechanics.LOAD_MULTIPLIER and len(mine):
+        # Peaks are increments of their own, which the two paths have at different places.
+        places = np.append(mine, ours.measured.argmax()), np.append(theirs, other.measured.argmax())
+    a, b = ours.measured[places[0]], other.measured[places[1]]
     first = LEAST_REACTION * np.abs(ours.measured[:1]).max(initial=0.0)
     apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
     moved = np.linalg.norm(ours.positions[mine] - other.positions[theirs], axis=2)
@@ -214,7 +218,7 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
         # Displacements of two phases are no measure of each other.
         ends = [np.nan, np.nan]
         stops = [f"{path.stop} in phase {path.collapse_phase + 1}" for path in (ours, other)]
-    worst = mine[np.argmax(apart)] if apart.any() else None
+    worst = places[0][np.argmax(apart)] if apart.any() else None
     phase = 0 if worst is None else int(ours.phases[worst])
     return StepCheck(
         what=response.measured.name,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -26,6 +26,9 @@ class Driver(ABC):
     misdirected = ""
     #: Values that are reported, too.
     stops: Sequence[float] = ()
+    #: Of a live load alone: control displacement [m] at a pose, and its gradient, (n_blocks, n_dof) array.
+    control_displacement: Callable[[Pose], float]
+    control: Callable[[Pose], np.ndarray]
 
     def __init__(self, assembly: Assembly, given: Any, start: Pose) -> None:
         self.assembly, self.start = assembly, start
@@ -50,14 +53,6 @@ class Driver(ABC):
     def lever(self, model: Model) -> float:
         """Largest displacement that it prescribes, per unit of it."""
         return 1.0
-
-    def control_displacement(self, pose: Pose) -> float:
-        """Control displacement at a pose; 0 where supports drive."""
-        return 0.0
-
-    def control(self, pose: Pose) -> np.ndarray | None:
-        """(n_blocks, n_dof) array: gradient of the control displacement; None where supports drive."""
-        return None
 
 
 class SupportMotion(Driver):
@@ -154,10 +149,9 @@ class ControlledLoad(Driver):
         super().__init__(assembly, chosen, start)
         self.block, d = assembly.index(chosen.block), assembly.dimension
         self.along = np.eye(d)[0] if chosen.direction is None else np.asarray(chosen.direction)
-        self.drawn, self.offset = assembly.centroids[self.block], 0.0
         #: From the centroid of the block as drawn to the point.
-        self.arm = np.zeros(d) if chosen.point is None else np.asarray(chosen.point) - self.drawn
-        self.offset = self.control_displacement(start)
+        self.arm = np.zeros(d) if chosen.point is None else np.asarray(chosen.point) - assembly.centroids[self.block]
+        self.begun = start.positions[self.block] + self._turned(start)
         self.misdirected = (
             f"the mechanism does not move block '{chosen.block}' along {chosen.direction or 'x'}; choose another "
             "control block, point or direction"
@@ -173,8 +167,7 @@ class ControlledLoad(Driver):
 
     def control_displacement(self, pose: Pose) -> float:
         """Since the start [m]."""
-        moved_by = pose.positions[self.block] + self._turned(pose) - self.drawn - self.arm
-        return float(moved_by @ self.along) - self.offset
+        return float((pose.positions[self.block] + self._turned(pose) - self.begun) @ self.along)
 
     def control(self, pose: Pose) -> np.ndarray:
         """Gradient of the displacement of the control point."""

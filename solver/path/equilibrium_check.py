@@ -63,7 +63,7 @@ class EquilibriumChecks:
 
         With a reaction [N or N·m] those that have it; ``at_rest`` those of least elastic energy. Raises ``NotSolved``.
         """
-        every, _ = self._contacts_at(place)
+        every = self.stepper.contacts_at(place)
         program, closed = self._program(place, gap, None if reaction is None else self.driver.rate(place.s))
         forces = np.zeros_like(every.points)
         reference = forces if at_rest else self.stepper.transferred(place, every)[0]
@@ -77,12 +77,12 @@ class EquilibriumChecks:
         self, place: Place, reaction: float, gap: float = COMPUTED_GAP, known: EquilibriumBounds | None = None
     ) -> EquilibriumCheck:
         """Bounds at a place, unless known, and forces in equilibrium with the path's reaction, or its multiplier."""
-        contacts, friction = self._contacts_at(place)
+        contacts = self.stepper.contacts_at(place)
         bounds = known or self.bounds(place, gap)
         target = reaction if not self.model.has_live else place.multiplier
         if not bounds.in_equilibrium:
             # The forces of the program that comes nearest to equilibrium.
-            return EquilibriumCheck(place, contacts, friction, bounds.forces[0], bounds.high, bounds)
+            return EquilibriumCheck(place, contacts, bounds.forces[0], bounds.high, bounds)
         low, high = (value if np.isfinite(value) else target for value in (bounds.low, bounds.high))
         measured = float(np.clip(target, low, max(low, high)))
         if not self.model.has_live and self.model.interfaces.ground:
@@ -90,7 +90,7 @@ class EquilibriumChecks:
             with suppress(NotSolved):
                 forces = self.nearest(place, gap)
                 measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
-                return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
+                return EquilibriumCheck(place, contacts, forces, measured, bounds)
         determined = self.model.has_live or not bounds.high - bounds.low > 1e-6 * max(abs(low), abs(high))
         try:
             forces = self.nearest(replace(place, multiplier=measured), gap, None if determined else measured)
@@ -98,7 +98,7 @@ class EquilibriumChecks:
             # A mean of the forces of both bounds is in equilibrium, too.
             part = float(np.interp(measured, (low, max(low, high)), (0.0, 1.0)))
             forces = (1.0 - part) * bounds.forces[0] + part * bounds.forces[-1]
-        return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
+        return EquilibriumCheck(place, contacts, forces, measured, bounds)
 
     def reaction(self, place: Place, contacts: Contacts, forces: np.ndarray) -> float:
         """Reaction of forces in units of the program [N or N·m]."""
@@ -120,7 +120,7 @@ class EquilibriumChecks:
         Where friction with dilatancy has no limit the path does not begin.
         """
         program, closed = self._program(place, COMPUTED_GAP)
-        forces = self.stepper.transferred(place, self._contacts_at(place)[0])[0][closed] - program.least
+        forces = self.stepper.transferred(place, self.stepper.contacts_at(place))[0][closed] - program.least
         resting = ProgramState(forces, place.multiplier / program.unit, np.zeros_like(program.dead), 0.0)
         try:
             limit, converged = non_associative_limit(program, forces[:, 0], resting, bounded=True)
@@ -136,18 +136,13 @@ class EquilibriumChecks:
             motion = program.bound(-1.0, program.most_balanced()[0]).velocity
         except Unbounded:
             return False
-        assert control is not None
         grows = float(motion @ (control * self.model.lengths / self.model.length)[self.stepper.free].ravel())
         return grows > SMALLEST_RATE * float(np.abs(motion).max())
 
     def _program(self, place: Place, gap: float, rate: np.ndarray | None = None) -> tuple[StaticProgram, np.ndarray]:
         """The program over the contact points that may carry, and which these are, (n_contacts,) bool array."""
-        contacts, friction = self._contacts_at(place)
+        contacts = self.stepper.contacts_at(place)
         closed, limits = self.stepper.force_limits(place, contacts, gap)
-        points = contacts[closed], friction[closed], limits[closed], np.zeros(closed.sum())
+        points = contacts[closed], self.stepper.friction(contacts)[closed], limits[closed], np.zeros(closed.sum())
         senses = (1.0, -1.0) if self.model.has_live else ()
         return StaticProgram(self.model, place.pose, *points, senses=senses, rate=rate), closed
-
-    def _contacts_at(self, place: Place) -> tuple[Contacts, np.ndarray]:
-        contacts = self.stepper.contacts_at(place)
-        return contacts, self.stepper.friction(contacts)

@@ -23,12 +23,14 @@ from solver.ties import (
     tie_ends,
     tie_lengths,
 )
-from solver.tolerances import AT_LIMIT
 
 from .state import Place
 
 #: Error of the length of a member, as a part of the gap of contact points that carry: that of the geometry.
 GIVE = 1e-2
+
+#: Part of its strength by which a member is stretched beyond it in the step in which it first reaches it, at most.
+STRETCHED = 1e-2
 
 
 class Members:
@@ -36,11 +38,11 @@ class Members:
 
     def __init__(self, model: Model) -> None:
         self.model, self.ties = model, model.ties
-        self.stiffness = np.array([tie.stiffness for tie in self.ties])
         self.strength = np.array([tie.strength for tie in self.ties]) / model.force
         self.brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
+        self.give = np.array([tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in self.ties])
         # In units of the program.
-        self.compliance = model.force / (self.stiffness * model.length)
+        self.compliance = model.force / (np.array([tie.stiffness for tie in self.ties]) * model.length)
         self.held = held_ties(self.ties, model.fallen)
 
     def installed(self, place: Place, phase: int, told: TieForces | None = None) -> Place:
@@ -51,8 +53,8 @@ class Members:
         lengths = place.tie_lengths if len(place.tie_lengths) else np.full((len(self.ties), 2), np.nan)
         new = np.array([tie.phase == phase + 1 for tie in self.ties])
         length = tie_lengths(tie_ends(self.ties, self.model.assembly, place.pose))
-        give = np.array([tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in self.ties])
-        return replace(place, tie_lengths=np.where(new[:, None], np.stack([length, length - give], axis=1), lengths))
+        both = np.column_stack([length, length - self.give])
+        return replace(place, tie_lengths=np.where(new[:, None], both, lengths))
 
     def beside(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
         """The contact points of blocks, then those of the members that are there."""
@@ -93,32 +95,39 @@ class Members:
         compliance[pulls, 1:] = (length / forces[pulls, 0])[:, None]
         return bound, compliance
 
-    def after(self, contacts: Contacts, forces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """(n_ties, 2) array: lengths after a step to contact points with these forces: what yields gives for good."""
-        full = self._at_strength(contacts, forces)
+    def after(self, contacts: Contacts, trial: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """(n_ties, 2) array: lengths after a step to contact points with these trial forces: give stays."""
+        full = self._at_strength(contacts, trial)
         number, sense = contacts.features[full, 1], np.where(contacts.features[full, 2] == 1, -1.0, 1.0)
         give = -contacts.gaps[full] - self.strength[number] * self.compliance[number] * self.model.length
         lengths = lengths.copy()
         lengths[number, 1] += sense * np.maximum(give, 0.0)
         return lengths
 
-    def work_beyond(self, before: np.ndarray, after: np.ndarray) -> float:
-        """Work of brittle members that give for good in a step, between two (n_ties, 2) arrays of lengths."""
-        give = np.abs(after - before)[self.brittle, 1] / self.model.length
-        return float(np.nansum(self.strength[self.brittle] * give))
+    def part_to_strength(self, place: Place, new: Place) -> float:
+        """Part of a step, from place to place, in which a member first comes to its strength; 1 where none does."""
+        assert new.contacts is not None
+        full = self._at_strength(new.contacts, new.trial)
+        started = self.measured(new.contacts[full], place.pose, place.tie_lengths)
+        number, after = started.features[:, 1], new.trial[full, 0]
+        before, strength = -started.gaps / self.model.length / self.compliance[number], self.strength[number]
+        # Those that have yielded are at their strength, or a little below it as joints give.
+        whole = np.isclose(place.tie_lengths[:, 1], place.tie_lengths[:, 0] - self.give, rtol=1e-12, atol=0.0)[number]
+        far = whole & (after > (1.0 + STRETCHED) * strength)
+        return float((((1.0 + 0.5 * STRETCHED) * strength - before) / (after - before))[far].min(initial=1.0))
 
     def without_broken(self, place: Place) -> Place:
         """The place without brittle members at their strength: they carry it there, and break as they go on."""
         if place.contacts is None or not self.brittle.any():
             return place
-        number, lengths = place.contacts.features[self._at_strength(place.contacts, place.forces), 1], place.tie_lengths
+        number, lengths = place.contacts.features[self._at_strength(place.contacts, place.trial), 1], place.tie_lengths
         broken = self.brittle & np.isin(np.arange(len(self.ties)), number)
         return replace(place, tie_lengths=np.where(broken[:, None] & [False, True], np.nan, lengths))
 
-    def _at_strength(self, contacts: Contacts, forces: np.ndarray) -> np.ndarray:
-        """Numbers of the contact points of members whose forces are at their strength."""
+    def _at_strength(self, contacts: Contacts, trial: np.ndarray) -> np.ndarray:
+        """Numbers of the contact points of members that have come to their strength, by their trial forces."""
         members = np.flatnonzero(is_member(contacts))
-        return members[forces[members, 0] >= (1.0 - AT_LIMIT) * self.strength[contacts.features[members, 1]]]
+        return members[trial[members, 0] >= self.strength[contacts.features[members, 1]]]
 
     def told(self, contacts: Contacts, forces: np.ndarray, pose: Pose, lengths: np.ndarray) -> TieForces:
         """What the members do at a place, from forces in units of the program."""

@@ -24,7 +24,7 @@ from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
 from .reports import Reports, no_equilibrium
 from .state import EquilibriumCheck, PathState, Place
-from .stepping import CARRIES, StepError, Stepper
+from .stepping import CARRIES, Stepper
 
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.05, 1e-11
@@ -386,8 +386,9 @@ class Path:
             new, motion, error = self.stepper.step(place, length, viscosity=viscosity, exact=exact)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
-        if error.penetration > CLOSING_GAP and length > FIRST_STEP * unit:
-            return replace(state, step=length / 3.0), None
+        part = 1.0 / 3.0 if error.penetration > CLOSING_GAP else self.stepper.members.part_to_strength(place, new)
+        if part < 1.0 and length > FIRST_STEP * unit:
+            return replace(state, step=part * length), None
         presses = error.penetration > CLOSING_GAP or new.forces[:, 0].max(initial=0.0) > 100.0 * self.model.total_load
         if presses and self._supports_locked(place):
             return state, self.reports.locked(new)
@@ -400,7 +401,7 @@ class Path:
         measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
-        if not self._is_on_path(new, error, length, refining):
+        if not self._is_on_path(state, new, error.moved, refining):
             if not enclosing:
                 return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
@@ -441,15 +442,19 @@ class Path:
         # A step that was cut at its target does not shorten the next.
         return min(LONGEST_STEP * self.stepper.unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
-    def _is_on_path(self, new: Place, error: StepError, length: float, refining: bool) -> bool:
+    def _is_on_path(self, state: PathState, new: Place, moved: float, refining: bool) -> bool:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
         if self.model.has_live and new.multiplier <= 0.0 and new.s > self._onset():
             return False
-        fast = error.moved > min(max(FAST * length / self.stepper.unit, MECHANISM), LONGEST_STEP)
+        # What creeps moves little in a step that is short, and far in several.
+        fast = moved > LONGEST_STEP or any(
+            self.fall.movements(place, new).max() > max(FAST * (new.s - place.s) / self.stepper.unit, MECHANISM)
+            for place in (state.place, *state.history)
+        )
         if not (fast or refining):
             return True
         # What jumps is followed in time, however little viscosity there is.
-        if refining and error.moved > LONGEST_STEP:
+        if refining and moved > JUMP:
             return False
         # Blocks that the viscosity retards may come to rest nearby.
         return self._carries(new) or (not refining and self.fall.relaxed(new, JUMP) is not None)

@@ -37,7 +37,7 @@ class Reports:
         """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
         model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
         support_forces = on_supports(model, contacts, place.pose, check.forces)
-        state = self._state(place, contacts, check.forces, check.friction, velocity, support_forces)
+        state = self._state(place, contacts, check.forces, self.stepper.friction(contacts), velocity, support_forces)
         gaps, least, cohesion = self.stepper.joint_limits(place, contacts, check.forces)
         between, beyond = ~is_member(contacts), check.forces.copy()
         beyond[:, 0] -= least

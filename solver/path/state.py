@@ -67,7 +67,6 @@ class EquilibriumCheck:
 
     place: Place
     contacts: Contacts
-    friction: np.ndarray  #: (n_contacts,)
     forces: np.ndarray  #: (n_contacts, d): in equilibrium where one exists; otherwise those that come nearest to it
     measured: float  #: reaction [N or N·m], or multiplier of the live load
     bounds: EquilibriumBounds

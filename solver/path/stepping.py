@@ -312,7 +312,6 @@ class Stepper:
         new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
         memory = tolerances.FRICTION_MEMORY if model.has_live else memory
         work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size, memory)
-        work += self.members.work_beyond(place.tie_lengths, new.tie_lengths)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
         return new, motion / model.lengths, StepError(work, turn, movement_size, self._penetration(points, new))
@@ -458,7 +457,7 @@ class Stepper:
         shares = np.maximum(share, gap / (gap + OPEN * self.model.length))
         # New contact points have the friction of their normal force at once.
         after = np.where(points.is_new, normal, followed + shares * (normal - followed))
-        lengths = self.members.after(contacts, new.forces, place.tie_lengths)
+        lengths = self.members.after(contacts, new.trial, place.tie_lengths)
         bonds = self.mortar.bonds(place, points.start, left.left)
         return replace(new, followed=after, tie_lengths=lengths, bonds=bonds)
 

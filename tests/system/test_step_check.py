@@ -19,6 +19,7 @@ from blockvis.report.page import add_error
 from blockvis.runs import step_check
 from blockvis.runs.once_more import takes_steps, traced
 from blockvis.runs.step_check import StepCheck, StepChecking, compared, stored_check
+from solver import mechanics
 
 CASE = """
 [geometry]
@@ -199,6 +200,15 @@ def test_runs_are_compared_at_the_same_places_only(settled):
     assert (check.difference, check.at) == (pytest.approx(0.02), pytest.approx(0.1))
     assert check.position == pytest.approx(0.005)
     assert check.error == 2.0 * check.difference
+
+
+def test_the_peaks_of_two_pushovers_are_compared_wherever_they_are(settled):
+    ours = traced(settled)
+    last = np.arange(len(ours.parameters)) == len(ours.parameters) - 1
+    higher = np.where(last, 2.0 * ours.measured.max(), ours.measured)
+    other = replace(ours, parameters=ours.parameters + 1e-3 * last, measured=higher)
+    assert compared(settled, other).difference == 0.0
+    assert compared(replace(settled, measured=mechanics.LOAD_MULTIPLIER), other).difference == pytest.approx(1.0)
 
 
 def test_an_error_is_told_in_the_unit_of_the_settlement_where_it_is_and_with_its_phase(settled):

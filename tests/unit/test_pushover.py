@@ -1,5 +1,6 @@
 import json
 import pkgutil
+import re
 from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
@@ -212,6 +213,11 @@ def test_the_peak_at_which_a_tie_or_a_joint_breaks_is_told_however_long_incremen
     # It breaks at 5 mm, where the middle of the block has moved by half of that.
     assert found.path[1].ties.elongations == pytest.approx([0.005], rel=0.02)
     assert found.settlement[1] == pytest.approx(0.0025, rel=0.02)
+    # So does one that yields, from where the multiplier falls.
+    ductile = {**tied, "ties": [replace(tie, stiffness=1e5, brittle=False)]}
+    found = solver.Structure(assembly, loads=loads, **ductile).pushover(control)
+    assert found.settlement[1] == pytest.approx(0.0025, rel=0.02)
+    assert found.load_multiplier[1] == found.load_multiplier.max()
     law = solver.InterfaceLaw(2.0, cohesion=2e5, tensile_strength=1e5, normal_stiffness=1e9, shear_stiffness=5e8)
     glued = solver.Structure(assembly, solver.Interfaces(law), loads)
     # What opens first is the joint at its strength, as the limit load has it.
@@ -252,10 +258,16 @@ def test_the_peak_before_a_jump_is_told_and_leaves_the_path_as_it_was():
     assembly = solver.Assembly.from_outlines(outlines, roles=["free"] * 4 + ["fixed"])
     structure = solver.Structure(assembly, friction_coefficient=1.0).with_live(acceleration=(-1, 0))
     control = solver.ControlDisplacement(assembly.names[0], (-1, 0), increment=0.1, limit=0.1)
-    paths = [structure.pushover(replace(control, increment=increment)) for increment in (0.1, 0.05, 0.02)]
-    largest = [max(path.load_multiplier) for path in paths]
-    assert largest == pytest.approx([0.89] * 3, rel=0.02)
-    assert [path.load_multiplier[-1] for path in paths] == pytest.approx([0.48] * 3, rel=0.03)
+    paths = [structure.pushover(replace(control, increment=increment)) for increment in (0.1, 0.02)]
+    # What topples through the gap moves little in each of many short steps; viscosity carried 0.95 before 1 mm.
+    shorter = structure.pushover(replace(control, limit=0.002), controls=solver.Controls(step_tolerance=2e-4))
+    for path in (*paths, shorter):
+        topples = r"at [1-5](\.\d+)?e-05 m: blocks 'block 1', 'block 2' moved by up to 0.024 m at once"
+        assert re.search(topples, path.notes[0])
+        assert max(i.load_multiplier for i in path.path if i.parameter < 0.002) < 0.86
+    assert [max(path.load_multiplier) for path in paths] == pytest.approx([0.895] * 2, rel=0.01)
+    # Where it ends after a jump hangs on the steps, which blockvis run tells; here it is an equilibrium.
+    assert all(path.path[-1].least <= path.load_multiplier[-1] <= path.path[-1].largest for path in paths)
     assert all((np.diff(path.settlement) > 0.0).all() for path in paths)
 
 
@@ -339,7 +351,8 @@ def test_far_from_the_origin_a_pushover_is_what_it_is_near():
             "block 0", (1, 0), tuple(origin + np.array([0.25, 1.0])), increment=0.02, limit=0.02
         )
         response = structure.pushover(control)
-        first, last = response.path
+        # The tie yields on the way, which is a peak.
+        first, _, last = response.path
         again = structure.pushover(control, pose=last.pose, ties_at=last.ties).path[0]
         assert again.load_multiplier == pytest.approx(last.load_multiplier, rel=1e-8)
         assert last.ties.ends[0, 1] == pytest.approx(ends[1], abs=1e-9)
