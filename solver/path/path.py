@@ -214,7 +214,7 @@ class Path:
                     yield from self._report_last(state)
                 return outcome
             beyond = self._place_beyond(state)
-            end, at_rest = self._come_to_rest(beyond)
+            end, at_rest = self.fall.relax(beyond)
             continued = self._continue_from(self.state, end) if at_rest else self._remove_fallen(self.state, end)
             if continued is None:
                 state, check = yield from self._report_last(state)
@@ -456,16 +456,11 @@ class Path:
         # What jumps is followed in time, however little viscosity there is.
         if refining and moved > JUMP:
             return False
+        # Of a live load that has viscosity in it more than a step may err by.
+        if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
+            return True
         # Blocks that the viscosity retards may come to rest nearby.
-        return self._carries(new) or (not refining and self.fall.relaxed(new, JUMP) is not None)
-
-    def _carries(self, place: Place) -> bool:
-        """Whether a place is in equilibrium, of a live load with all but the part that a step may err by."""
-        return self.checks.in_equilibrium(place, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance))
-
-    def _come_to_rest(self, place: Place) -> tuple[Place, bool]:
-        """Where blocks move, and whether they come to rest: at once where they, having snapped, have an equilibrium."""
-        return (place, True) if self._carries(place) else self.fall.relax(place)
+        return not refining and self.fall.relaxed(new, JUMP) is not None
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
         """Go back to the last place in equilibrium from a parameter that has none."""
@@ -535,7 +530,9 @@ class Path:
         self.reports.notes, self.stepper.programs = [*notes, (state.place.s, words)], programs
         pose = put_together(leaving, end.pose, state.place.pose)
         remaining = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
-        end, at_rest = self._come_to_rest(remaining.place)
+        end, at_rest = remaining.place, self.checks.in_equilibrium(remaining.place)
+        if not at_rest:
+            end, at_rest = self.fall.relax(end)
         continued = self._continue_from(remaining, end) if at_rest else self._remove_fallen(remaining, end)
         if continued is None:
             self._remove_blocks(before)

@@ -69,14 +69,6 @@ def test_tiny_blocks_stand_like_others():
     assert finding.outcome == "limit reached"
 
 
-@pytest.mark.slow
-def test_what_has_an_equilibrium_has_not_collapsed():
-    """Here blocks snapped in a step of little viscosity, and a collapse was told where an equilibrium was known."""
-    finding = tried("voronoi", 50008)
-    assert finding.wrong == []
-    assert finding.outcome == "limit reached"
-
-
 @pytest.mark.thorough
 def test_a_way_that_turns_back_beyond_its_step_is_followed():
     finding = tried("voronoi", 30152)
