@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -140,9 +141,9 @@ class Polyhedra(Solids):
         i, j = i[other], j[other]
         none = np.zeros(len(placed.solids.block_of_face), dtype=bool)
         apart = np.full(len(i), -np.inf)
-        # The faces of one, those of the other, and the edges of both.
-        for of, last in ((face_separations, none), (face_separations, none), (edge_separations, ROUNDING)):
-            apart = np.maximum(apart, of(placed, i, j, last)[0])
+        by_faces, by_edges = partial(face_separations, inner=none), partial(edge_separations, smallest_sine=ROUNDING)
+        for of in (by_faces, by_faces, by_edges):
+            apart = np.maximum(apart, of(placed, i, j)[0])
             deep = apart < -tolerance
             i, j, apart = j[deep], i[deep], apart[deep]
         blocks = np.sort(np.stack([block_of_part[i], block_of_part[j]], axis=1), axis=1)

@@ -33,7 +33,7 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
     n, start, end = np.int64(len(joined.vertices)), joined.corners, joined.corners[joined.next_corner]
     _, number, counts = np.unique(start * n + end, return_inverse=True, return_counts=True)
     closed = np.isin(end * n + start, start * n + end) & (counts[number] == 1)
-    for block in np.unique(joined.block_of_face[joined.face_of_corner[~closed]]).tolist():
+    for block in map(int, np.unique(joined.block_of_face[joined.face_of_corner[~closed]])):
         _refuse_open(*surfaces[block], names[block])
     _refuse_pieces(joined, names)
     volumes = joined.volumes
