@@ -17,7 +17,7 @@ from .geometry.outlines import self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
-from .tolerances import DRAWN_GAP
+from .tolerances import DRAWN_GAP, PENETRATION_FRACTION
 from .views import Shown
 
 #: The shapes of all blocks, in the plane or in space: their sizes, and their contact points.
@@ -277,22 +277,26 @@ class Assembly(Kept, Shown):
 def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
     """Raise ``ValueError`` where no block is free or two overlap, by their names and the depth, before all is solved.
 
-    An overlap up to the tolerance [m] is accepted, a thousandth of the width of the thinnest block by default.
+    An overlap up to the tolerance [m] is accepted, a thousandth of the width of the thinnest block by default, where it
+    is less than contact points know: a tenth of the width of the thinner of the two blocks.
     """
     if not assembly.free.any():
         raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")
     tolerance = DRAWN_GAP * assembly.widths.min() if overlap_tolerance is None else overlap_tolerance
     if not (tolerance := plain(tolerance, "float", "overlap_tolerance")) >= 0.0:
         raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be at least 0")
-    i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
-    real = np.flatnonzero(assembly.free[i] | assembly.free[j])
+    deepest = PENETRATION_FRACTION * assembly.widths
+    i, j, depth = assembly.shapes.overlaps(assembly.vertices, min(tolerance, deepest.min()))
+    known = np.minimum(deepest[i], deepest[j])
+    real = np.flatnonzero((assembly.free[i] | assembly.free[j]) & (depth > np.minimum(tolerance, known)))
     if len(real):
         k = int(real[np.argmax(depth[real])])
         a, b = int(i[k]), int(j[k])
         more = f" ({counted(len(real) - 1, 'more pair overlaps', 'more pairs overlap')})" if len(real) > 1 else ""
+        raising = f" or raise overlap_tolerance ({tolerance:.3g} m)"
         raise ValueError(
             f"block {a} ('{assembly.names[a]}') overlaps block {b} ('{assembly.names[b]}') by {depth[k]:.3g} m{more}; "
-            f"move them apart or raise overlap_tolerance ({tolerance:.3g} m)"
+            f"move them apart{raising if depth[k] <= known[k] else f': they touch no deeper than {known[k]:.3g} m'}"
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.tolerances import CORNER_TOLERANCE
 
-from .convex_parts import A_LITTLE, ENDS, GOES_ON, PlacedParts
+from .convex_parts import ENDS, PlacedParts
 from .facing import SMALLEST_SINE
 from .outlines import next_vertices
 from .portions import alike
@@ -87,42 +87,9 @@ def _clipped(
     crossings = a[pair, p] + u[:, None] * along_a[pair, p]
     across = pair, feature_rows(ACROSS, edge_a[pair, p], edge_b[pair, q], places), crossings
     owner, features, points = map(np.concatenate, zip(on_corner, vertex_a, vertex_b, across, strict=True))
-    areas, wide, long, middle = corner_areas(owner, points, len(face_a))
+    areas, wide = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
-    clipped = ClippedCorners(owner[kept], features[kept], areas[kept], wide[owner[kept]])
-    if parts.whole:
-        return clipped
-    line, lines = (wide <= end[:, 0]) & (long > 100.0 * end[:, 0]), []
-    middles = origin[:, 0] + middle[:, :1] * x + middle[:, 1:] * y
-    for edge, start, direction in ((edge_b, b, unit_b), (edge_a, a, unit_a)):
-        # The edge along which all lies that is covered.
-        off = np.zeros(edge.shape)
-        np.maximum.at(off, owner, np.abs(_inside(points[:, None], start[owner], direction[owner])[:, 0]))
-        line &= off.min(axis=1) <= end[:, 0]
-        lines.append(edge[np.arange(len(edge)), off.argmin(axis=1)])
-    of_a = _line_ends(placed, line, middles, used_a, corner_a, *vertex_b[:2], face_b, *lines)
-    of_b = _line_ends(placed, line, middles, used_b, corner_b, *vertex_a[:2], face_a, *lines[::-1])
-    return ClippedCorners(*map(np.concatenate, zip(clipped, of_a, of_b, strict=True)))
-
-
-def _line_ends(placed: PlacedParts, line: np.ndarray, middles: np.ndarray, *side: np.ndarray) -> ClippedCorners:
-    """Find the ends of lines in which faces, (n,), are touched along edges beyond which these go on.
-
-    Where a face ends at an edge of its block, an edge that only lies along that one may leave it. In a re-entrant
-    corner it may not: the face holds it, at its own corners and where it crosses the sides of the face.
-    """
-    corners, (used, corner, owner, features, face, edge, along) = placed.solids.corners, side
-    pair, p = np.nonzero(used & line[:, None])
-    owner, end, code = np.column_stack([owner, features[:, [1, 3]]])[line[owner] & (features[:, 3] >= 0)].T
-    own, other, crossed = corners[corner[pair, p]], along[owner], code % len(corners)
-    direction = placed.along(other)
-    place = dot(placed.vertices[end] - placed.starts(other), direction) / dot(direction, direction)
-    across = feature_rows(ACROSS, other, crossed, places_of(place, corners[crossed] != end))
-    features = np.concatenate([feature_rows(ON_FACE, own, face[pair], -1), across])
-    pair, at = np.append(pair, owner), placed.vertices[np.append(own, end)]
-    kept = placed.kinds_at(edge[pair], at + A_LITTLE * (middles[pair] - at)) == GOES_ON
-    zeros = np.zeros(np.count_nonzero(kept))
-    return ClippedCorners(pair[kept], features[kept], zeros, zeros + np.inf)
+    return ClippedCorners(owner[kept], features[kept], areas[kept], wide[owner[kept]])
 
 
 def _crossings(
@@ -184,7 +151,7 @@ def _on_face(
 
 
 def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, ...]:
-    """Tributary areas (n,) [m²] of corners (n, 2), in any order, of convex polygons; their widths, lengths, middles."""
+    """Tributary areas (n,) [m²] of corners (n, 2), in any order, of convex polygons; their widths."""
     number = np.bincount(owner, minlength=count)
     total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
     middle = total / np.maximum(number, 1)[:, None]
@@ -202,4 +169,4 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     area = np.bincount(owner, shares, minlength=count)
     far = np.zeros(count)
     np.maximum.at(far, owner, np.hypot(arms[:, 0], arms[:, 1]))
-    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300), 2.0 * far, middle
+    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300)

@@ -158,7 +158,9 @@ def convex_parts(solids: Solids) -> ConvexParts:
     pieces: list[np.ndarray] = []
     for block in range(len(solids)):
         own, loops = solids.surface(block)
-        frame = _spread_corners(own)
+        # Four corners far from a common plane.
+        first = int(np.linalg.norm(own - own.mean(axis=0), axis=1).argmax())
+        frame = np.append(first, qr((own - own[first]).T, mode="r", pivoting=True)[1][:3])
         parts = [(own, loops, [(k, np.tile([0.0, 1.0, ENDS], (len(loop), 1, 1))) for k, loop in enumerate(loops)])]
         if bent[block]:
             try:
@@ -194,12 +196,6 @@ def _out_of_faces(solids: Solids) -> np.ndarray:
         distance = dot(faces.normals[face][:, :, None], corner[:, None] - faces.middles[face][:, :, None])
         out[k] = distance.max(axis=(1, 2))
     return out
-
-
-def _spread_corners(vertices: np.ndarray) -> np.ndarray:
-    """(4,) int array: four corners far from a common plane."""
-    first = int(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1).argmax())
-    return np.append(first, qr((vertices - vertices[first]).T, mode="r", pivoting=True)[1][:3])
 
 
 @dataclass(frozen=True)

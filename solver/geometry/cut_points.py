@@ -58,7 +58,7 @@ def without_points_of_cuts(
     # Each place once, though several parts have a corner there.
     spans = ~between
     spans[pairs[spans[pairs].all(axis=1)].max(axis=1)] = False
-    shares, *_ = corner_areas(group_of[spans], places[spans], len(counts))
+    shares, _ = corner_areas(group_of[spans], places[spans], len(counts))
     share_sum = np.bincount(group_of[spans], shares, minlength=len(counts))
     per_share = np.bincount(group_of, contacts.areas[chosen]) / np.maximum(share_sum, 1e-300)
     areas = contacts.areas.copy()

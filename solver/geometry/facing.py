@@ -32,6 +32,9 @@ class FacingParts:
     face_j: np.ndarray
     width: np.ndarray  #: [m], of the thinner of their blocks
     cosine: np.ndarray  #: between the two faces; -1 where they oppose each other
+    leading: np.ndarray  #: the leading face, the part before it, and the face of that which opposes it best
+    part: np.ndarray
+    answering: np.ndarray
 
     def __getitem__(self, chosen: np.ndarray) -> FacingParts:
         """Choose some of the pairs, by a mask or their numbers."""
@@ -163,5 +166,6 @@ def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: 
     i_leads = np.where(equal, cosine_i <= cosine_j, apart_i > apart_j)
     faces = np.where(i_leads, lead_i, opposed_i), np.where(i_leads, opposed_j, lead_j)
     cosine = np.where(i_leads, cosine_i, cosine_j)
-    found = FacingParts(i, j, lead_i, lead_j, apart_i, apart_j, *faces, width, cosine)
+    answer = (np.where(i_leads, *choice) for choice in ((lead_i, lead_j), (j, i), (opposed_j, opposed_i)))
+    found = FacingParts(i, j, lead_i, lead_j, apart_i, apart_j, *faces, width, cosine, *answer)
     return found[(apart_j <= reach) & ~inside]

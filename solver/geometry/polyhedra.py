@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -13,7 +14,7 @@ from solver.words import kept
 from .broad_phase import box_pairs, expand_ranges
 from .clipping import clipped_faces
 from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
-from .convex_parts import ENDS, ConvexParts, PlacedParts, convex_parts
+from .convex_parts import ENDS, GOES_ON, ConvexParts, PlacedParts, convex_parts
 from .cut_points import without_points_of_cuts
 from .entering import Movement, across, entered
 from .facing import FacingParts, edge_separations, face_separations, facing_parts, near_parts
@@ -76,6 +77,8 @@ class Polyhedra(Solids):
         labels: list[np.ndarray] = []
         at_cut = np.bincount(solids.face_of_corner, parts.goes_on) > 0
         resolved, largest = np.zeros(len(every), dtype=bool), np.zeros(len(every))
+        # What lies along an edge of a cut stands on the face that goes on there, and no other answers.
+        on_cut = resolved if parts.whole else _edges_over(placed, facing, reach)[1]
         _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
         # Other faces are tried where those that oppose each other best do not cover each other.
         for pair, face_i, face_j in chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed)):
@@ -95,23 +98,22 @@ class Polyhedra(Solids):
             sliver = small[corners.owner] & (strip < SLIVER)
             # Edges that cross behind a plane that separates their parts do not touch.
             owner = pair[corners.owner]
-            behind = contacts.gaps < facing.apart[owner] - 1e-3 * facing.width[owner]
-            kept = ~slides_past & ~sliver & ~behind
+            kept = ~slides_past & ~sliver & (contacts.gaps >= facing.apart[owner] - 1e-3 * facing.width[owner])
             inside = near(contacts)
             # What touches along a line alone has no area.
             contacts = replace(contacts, areas=(np.bincount(corners.owner, inside) > 2)[corners.owner] * contacts.areas)
-            resolved[pair[corners.owner[kept & inside]]] = True
+            resolved = resolved | on_cut | (np.bincount(owner[kept & inside], minlength=len(every)) > 0)
             kept = np.flatnonzero(kept if not parts.whole else kept & inside)
             found.append(contacts[kept])
             owner = corners.owner[kept]
             labels.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
         # Where a plane separates parts and points of both are as near as that, no tips or edges touch.
         others = (pairs.apart < -SAME_PLACE * pairs.width) | (nearest > pairs.apart + SAME_PLACE * pairs.width)
-        tips = _measured(placed, _tips(placed, pairs[others & shallow], reach))
-        crossed = _measured(placed, _crossed_edges(placed, pairs[others], reach))
-        of_cuts = np.any([placed.kinds_at(edge, crossed.points) != ENDS for edge in crossed.features.T[1:3]], axis=0)
-        single = joined_contacts([tips, crossed[~of_cuts]])
-        single = single[near(single)]
+        beside = shallow & (others | _rests_on_more(placed, pairs))
+        over, crossed = _edges_over(placed, pairs[beside], reach)[0], _crossed_edges(placed, pairs[others], reach)
+        single = _measured(placed, np.vstack([over, crossed]))
+        beyond = [placed.kinds_at(edge, single.points) != ENDS for edge in single.features.T[1:3]]
+        single = single[near(single) & ~((single.features[:, 0] == ACROSS) & np.any(beyond, axis=0))]
         contacts = joined_contacts([*found, single])
         label = np.concatenate([*labels, np.tile([-1, -1, 1], (len(single), 1))])
         at_one_place = CORNER_TOLERANCE * float(widths.min())
@@ -137,18 +139,16 @@ class Polyhedra(Solids):
         other = block_of_part[i] != block_of_part[j]
         i, j = i[other], j[other]
         none = np.zeros(len(placed.solids.block_of_face), dtype=bool)
-        apart, _, _ = face_separations(placed, i, j, none)
-        deep = np.flatnonzero(apart < -tolerance)
-        i, j, apart = i[deep], j[deep], apart[deep]
-        apart = np.maximum(apart, face_separations(placed, j, i, none)[0])
-        deep = np.flatnonzero(apart < -tolerance)
-        i, j, apart = i[deep], j[deep], apart[deep]
-        apart = np.maximum(apart, edge_separations(placed, i, j, ROUNDING)[0])
-        deep = apart < -tolerance
-        blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
+        apart = np.full(len(i), -np.inf)
+        by_faces, by_edges = partial(face_separations, inner=none), partial(edge_separations, smallest_sine=ROUNDING)
+        for of in (by_faces, by_faces, by_edges):
+            apart = np.maximum(apart, of(placed, i, j)[0])
+            deep = apart < -tolerance
+            i, j, apart = j[deep], i[deep], apart[deep]
+        blocks = np.sort(np.stack([block_of_part[i], block_of_part[j]], axis=1), axis=1)
         pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)
         depth = np.zeros(len(pairs))
-        np.maximum.at(depth, pair_of.ravel(), -apart[deep])
+        np.maximum.at(depth, pair_of.ravel(), -apart)
         return pairs[:, 0], pairs[:, 1], depth
 
     def entered(
@@ -272,25 +272,59 @@ def _without_duplicates(contacts: Contacts, near: float) -> Contacts:
     return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
 
 
-def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
-    """Features of corners before a leading face that none of their faces opposes: a steep tip on a plane."""
-    solids, faces, vertices = placed.solids, placed.faces, placed.vertices
-    i_leads = pairs.face_i == pairs.lead_i
-    face, part = np.where(i_leads, pairs.lead_i, pairs.lead_j), np.where(i_leads, pairs.j, pairs.i)
-    owner, position = expand_ranges(np.diff(solids.offsets)[part])
-    vertex, face = solids.offsets[part][owner] + position, face[owner]
-    gap = dot(vertices[vertex] - faces.middles[face], faces.normals[face])
-    near = np.flatnonzero(gap <= reach)
-    vertex, face = vertex[near], face[near]
-    start = solids.face_offsets[face]
+def _rests_on_more(placed: PlacedParts, pairs: FacingParts) -> np.ndarray:
+    """(n,) bool array: where a part has corners as near to the leading face as any that its answering face lacks."""
+    offsets, faces, tolerance = placed.solids.offsets, placed.faces, SAME_PLACE * pairs.width
+    owner, position = expand_ranges(np.diff(offsets)[pairs.part])
+    corner = placed.vertices[offsets[pairs.part][owner] + position]
+    both = (pairs.leading[owner], pairs.answering[owner])
+    before, behind = (dot(corner - faces.middles[face], faces.normals[face]) for face in both)
+    more = (before <= (pairs.apart + tolerance)[owner]) & (behind < -tolerance[owner])
+    return np.bincount(owner, more, minlength=len(pairs.part)) > 0
+
+
+def _edges_over(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Features of both ends of what edges of a part have over the leading face: a ridge or a steep tip on a plane.
+
+    And of which pairs an edge lies along a boundary beyond which the face of the block goes on, (n,) bool.
+    """
+    solids, faces, (once, first) = placed.solids, placed.faces, placed.solids.whole_edges
+    owner, position = expand_ranges(np.diff(first)[pairs.part])
+    edge, face = once[first[pairs.part][owner] + position], pairs.leading[owner]
+    ends = np.stack([edge, solids.next_corner[edge]])
+    gaps = dot(placed.starts(ends) - faces.middles[face], faces.normals[face])
+    near = gaps.min(axis=0) <= reach
+    pair, edge, face, ends, gaps = owner[near], edge[near], face[near], ends[:, near], gaps[:, near]
     owner, position = expand_ranges(np.diff(solids.face_offsets)[face])
-    corner = start[owner] + position
+    corner, starts = solids.face_offsets[face][owner] + position, np.flatnonzero(position == 0)
     inward = cross(faces.normals[face[owner]], unit(placed.along(corner)))
-    inside = dot(vertices[vertex[owner]] - placed.starts(corner), inward)
-    inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
-    # What meets a boundary only, as a stone beyond the joint of its neighbour, does not stand on the face.
-    over = inside > CORNER_TOLERANCE * solids.shortest_edges[face]
-    return feature_rows(ON_FACE, vertex[over], face[over], -1)
+    inside = dot(placed.starts(ends[:, owner]) - placed.starts(corner), inward)
+    smallest = CORNER_TOLERANCE * solids.shortest_edges[face]
+    on_boundary = np.abs(inside).max(axis=0) <= smallest[owner]
+    slope = np.where(on_boundary, 0.0, inside[1] - inside[0])
+    # Along the edge; of what runs along a boundary, nowhere.
+    at = np.divide(-inside[0], slope, out=np.full(len(slope), -1.0), where=slope != 0.0)
+    low = np.maximum.reduceat(np.where(slope > 0.0, at, 0.0), starts).clip(0.0)
+    high = np.minimum.reduceat(np.where(slope < 0.0, at, 1.0), starts).clip(None, 1.0)
+    # What meets a boundary only, as a stone beyond the joint of its neighbour, does not stand on the face; where the
+    # face of the block goes on there is none.
+    middle = (low + high) / 2.0
+    points = placed.starts(edge) + middle[:, None] * placed.along(edge)
+    goes_on = on_boundary & (placed.kinds_at(corner, points[owner]) == GOES_ON)
+    depth = np.minimum.reduceat(np.where(goes_on, np.inf, inside[0] + middle[owner] * slope), starts)
+    along_face, farthest = depth > smallest, np.minimum(reach, STEEPEST_LANDING * depth)
+    for place in (low, high):
+        along_face &= (1.0 - place) * gaps[0] + place * gaps[1] <= farthest
+    at_end = np.array([low <= CORNER_TOLERANCE, high >= 1.0 - CORNER_TOLERANCE])
+    on_face = (gaps <= reach) & (along_face & at_end | (np.minimum.reduceat(inside, starts, axis=1) > smallest))
+    end, here = np.nonzero(on_face)
+    stands = feature_rows(ON_FACE, solids.corners[ends[end, here]], face[here], -1)
+    crosses = along_face[owner] & (at == np.where(slope > 0.0, low[owner], high[owner]))
+    crosses &= (at > CORNER_TOLERANCE) & (at < 1.0 - CORNER_TOLERANCE)
+    own, other = edge[owner[crosses]], corner[crosses]
+    meets = feature_rows(ACROSS, own, other, places_of(*_crossings(placed, own, other)))
+    on_cut = np.bincount(pair, along_face & np.logical_or.reduceat(goes_on, starts), minlength=len(pairs.part)) > 0
+    return np.unique(np.concatenate([stands, meets]), axis=0), on_cut
 
 
 def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:

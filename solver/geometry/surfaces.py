@@ -28,7 +28,11 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
     """Make polyhedra of the closed surfaces of blocks, with one face in each plane; raises as ``from_solids`` says."""
     surfaces = [_checked(solid, name) for solid, name in zip(solids, names, strict=True)]
     joined = Polyhedra.of_surfaces(surfaces)
-    for block in _blocks_of_open_edges(joined):
+    # An edge of a closed surface is run through once in each sense.
+    n, start, end = np.int64(len(joined.vertices)), joined.corners, joined.corners[joined.next_corner]
+    _, number, counts = np.unique(start * n + end, return_inverse=True, return_counts=True)
+    closed = np.isin(end * n + start, start * n + end) & (counts[number] == 1)
+    for block in map(int, np.unique(joined.block_of_face[joined.face_of_corner[~closed]])):
         _refuse_open(*surfaces[block], names[block])
     _refuse_pieces(joined, names)
     volumes = joined.volumes
@@ -92,15 +96,6 @@ def refuse_infinite(vertices: np.ndarray, name: str) -> None:
         raise ValueError(
             f"block '{name}': corner {corner} is {vertices[corner].tolist()}; coordinates must be finite numbers"
         )
-
-
-def _blocks_of_open_edges(solids: Solids) -> list[int]:
-    """Blocks with an edge that is not run through once in each sense."""
-    n = np.int64(len(solids.vertices))
-    start, end = solids.corners, solids.corners[solids.next_corner]
-    _, number, counts = np.unique(start * n + end, return_inverse=True, return_counts=True)
-    closed = np.isin(end * n + start, start * n + end) & (counts[number] == 1)
-    return np.unique(solids.block_of_face[solids.face_of_corner[~closed]]).tolist()
 
 
 def _refuse_open(vertices: np.ndarray, faces: list[list[int]], name: str) -> None:

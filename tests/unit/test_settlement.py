@@ -89,6 +89,9 @@ def test_overlapping_blocks_are_named_with_their_depth():
     )
     with pytest.raises(ValueError, match=r"'lower'\) overlaps block 1 \('upper'\) by 0\.1 m"):
         solver.settle(assembly, DOWN)
+    # Deeper than a tenth of their width 2 A / P they have no contact points, whatever is accepted.
+    with pytest.raises(ValueError, match=r"by 0\.1 m; move them apart: they touch no deeper than 0\.0667 m"):
+        solver.settle(assembly, DOWN, controls=solver.Controls(overlap_tolerance=0.2))
 
 
 def test_overlapping_supports_are_accepted():

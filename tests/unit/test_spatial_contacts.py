@@ -135,6 +135,37 @@ def test_a_ridge_stands_on_a_plane(lean):
         np.testing.assert_allclose(normals, [[0.0, 0.0, 1.0]] * len(closed), atol=1e-9)
 
 
+@pytest.mark.parametrize("ends", [(-9.0, 9.0), (-9.0, 0.2), (-0.3, 0.2)])
+def test_a_stone_on_an_edge_bears_on_both_ends_of_what_lies_on_the_slab(ends):
+    """Whichever of its faces opposes the slab best: of flat stones often one that has one end of the edge, or none."""
+    random = np.random.default_rng(18)
+    for _ in range(6):
+        points = random.normal(size=(8, 3))
+        corners, faces = hull_of(points / np.linalg.norm(points, axis=1)[:, None] * [1.0, 0.25, 1.0])
+        edge = corners[faces[0][:2]]
+        sides = [corners[face[:3]] for face in faces if {*faces[0][:2]} <= {*face}]
+        normals = np.array([np.cross(side[1] - side[0], side[2] - side[0]) for side in sides])
+        up = -(normals / np.linalg.norm(normals, axis=1)[:, None]).T @ random.dirichlet([3.0, 3.0])
+        length, up = np.linalg.norm(edge[1] - edge[0]), up / np.linalg.norm(up)
+        along = (edge[1] - edge[0]) / length
+        stone = (corners - edge.mean(axis=0)) @ np.array([along, np.cross(up, along), up]).T
+        slab, way = box((ends[0] * length, -3, -1), (ends[1] * length, 3, 0)), turn_by(random.normal(size=3))
+        contacts = found([(slab[0] @ way.T, slab[1]), (stone @ way.T, faces)])
+        closed = contacts.points[np.abs(contacts.gaps) < 1e-9] @ way
+        expected = [[place * length, 0.0, 0.0] for place in np.clip(ends, -0.5, 0.5)]
+        np.testing.assert_allclose(closed[np.argsort(closed[:, 0])], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("ends", [0.5, 2.0])
+def test_a_slab_lies_on_a_knife(ends):
+    """Whose flanks do not face it, and which ends under it or goes on beyond its edges."""
+    ridge = np.array([[0.0, -ends, 0.0], [0.0, ends, 0.0]])
+    knife = hull_of(np.concatenate([ridge, ridge - [0.01, 0.0, 0.4], ridge - [-0.01, 0.0, 0.4]]))
+    contacts = found([knife, box((-2, -1, 0), (2, 1, 0.1))])
+    np.testing.assert_allclose(np.sort(contacts.points[:, 1]), [-min(ends, 1.0), min(ends, 1.0)], atol=1e-9)
+    np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("half", [0.02, 0.3, 0.8, 1.4])
 def test_a_tip_stands_on_a_plane(half):
     around = 2 * np.pi * np.arange(5) / 5
