@@ -46,7 +46,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     suffix = path.suffix.lower()
     drawn = {".dae": dae.drawn_in, ".obj": _obj, ".off": _off}.get(suffix, _scene)(path)
     size = _checked_size(drawn.bodies)
-    if is_flat(np.concatenate([part.points for part in drawn.bodies])):
+    # A part that is no plane by its own size has to have a volume.
+    if all(map(is_flat, [np.concatenate([part.points for part in drawn.bodies]), *(p.points for p in drawn.bodies)])):
         flat = _flat(drawn.bodies, path, reading.view)
         return replace(flat, unit=drawn.unit, notes=(*flat.notes, *drawn.notes))
     bodies, notes = _enclosed(drawn, size, path, reading)

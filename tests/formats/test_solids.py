@@ -198,6 +198,17 @@ def test_the_triangles_of_a_flat_stl_that_share_edges_are_one_block(tmp_path):
     assert read(tmp_path / "a.stl").areas.tolist() == [1]
 
 
+def test_a_speck_with_a_volume_beside_flat_blocks_is_not_taken_for_flat(tmp_path):
+    """Here all together lie in a plane but for a millionth, and the speck ended with a traceback."""
+    (tmp_path / "a.obj").write_text(
+        "o wall\nv 0 0 0\nv 1000 0 0\nv 1000 900 0\nf 1 2 3\n"
+        "o speck\nv 0 -1 0\nv 1e-5 -1 0\nv 0 -1.00001 0\nv 0 -1 1e-5\nf 4 5 6\nf 4 6 7\nf 4 7 5\nf 5 7 6\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(ValueError, match="'wall' is not closed"):
+        read(tmp_path / "a.obj")
+
+
 BOX = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
 
 
