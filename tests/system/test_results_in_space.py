@@ -232,6 +232,7 @@ def test_the_view_shows_the_motion_across_it():
     assert np.linalg.det(axes) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_what_is_where():
     """Hinge, crack, moving support and paper stand at their places, in their colours."""
     response = vault_response()

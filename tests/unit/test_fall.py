@@ -331,6 +331,7 @@ def test_the_same_bytes_twice(tmp_path):
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
 
 
+@pytest.mark.slow
 def test_files_have_the_time_as_their_parameter(tmp_path):
     response, fall = shipped_arch(), fallen(shipped_arch)
     write_fall(fall, response, tmp_path)

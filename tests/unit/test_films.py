@@ -265,6 +265,7 @@ def test_the_legend_tells_where_not_each_load_has_an_arrow(dimension):
     assert np.diff(places).max() <= 2.0, "what is left out of loads that are alike lies apart"
 
 
+@pytest.mark.slow
 def test_forces_between_increments_are_those_of_the_reaction_that_the_title_tells():
     response = arch_response()
     moving = int(np.flatnonzero(response.assembly.moving)[0])
