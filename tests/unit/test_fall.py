@@ -409,6 +409,7 @@ def test_friction_of_each_pair_of_materials():
         assert (way > 0.3) == slides, (friction, way)
 
 
+@pytest.mark.slow
 def test_the_page_plays_the_fall_in_real_time():
     response, fall = shipped_arch(), fallen(shipped_arch)
     page = report_of(response, fall=fall)

@@ -318,6 +318,7 @@ def test_the_poster_of_what_does_not_fall_is_its_end(tmp_path):
     assert poster.read_bytes() == max(frames.iterdir()).read_bytes()
 
 
+@pytest.mark.slow
 def test_what_falls_is_not_hidden_by_what_stands():
     """A small block that slides along x behind a tall one is seen from behind it, where from the front it is not."""
     assembly = solver.Assembly.from_solids([box((0, 0, 0), (2, 0.3, 2)), box((0.8, 0.4, 0), (1.2, 0.8, 0.4))])
