@@ -45,7 +45,7 @@ OUTPUT = "standard output"
 
 #: What libraries of linear algebra take as they are loaded [bytes]; what Linux says where there is no memory, of
 #: libraries and of threads, too.
-LEAST_MEMORY = 5 << 27
+LEAST_MEMORY = 6 << 27
 NO_MEMORY = ("Cannot allocate memory", "failed to map segment", "can't start new thread")
 
 #: What the exit codes mean, for ``--help``.
