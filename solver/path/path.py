@@ -358,11 +358,10 @@ class Path:
                 return state, Ending(Status.LIMIT_REACHED)
             if state.refined and state.upper_bound - state.place.s <= self.driver.tolerance * (1.0 + 1e-9):
                 return state, Ending(Status.FALLING)
-            before = state
-            state, outcome = self._step(before, target)
+            last, (state, outcome) = state.place, self._step(state, target)
             self.tried = state
             self.on_step(state)
-            last, new, peak = before.place, state.place, self.highest.place
+            new, peak = state.place, self.highest.place
             fallen = (1.0 - DROP) * peak.multiplier > max(state.peak, new.multiplier)
             if fallen and new.s > peak.s > state.reported >= 0.0:
                 return state, Ending(Status.EQUILIBRIUM)
@@ -457,10 +456,9 @@ class Path:
         if refining and moved > JUMP:
             return False
         # Of a live load that has viscosity in it more than a step may err by.
-        if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
-            return True
+        carries = self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance))
         # Blocks that the viscosity retards may come to rest nearby.
-        return not refining and self.fall.relaxed(new, JUMP) is not None
+        return carries or (not refining and self.fall.relaxed(new, JUMP) is not None)
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
         """Go back to the last place in equilibrium from a parameter that has none."""
@@ -530,9 +528,8 @@ class Path:
         self.reports.notes, self.stepper.programs = [*notes, (state.place.s, words)], programs
         pose = put_together(leaving, end.pose, state.place.pose)
         remaining = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
-        end, at_rest = remaining.place, self.checks.in_equilibrium(remaining.place)
-        if not at_rest:
-            end, at_rest = self.fall.relax(end)
+        stands = self.checks.in_equilibrium(remaining.place)
+        end, at_rest = (remaining.place, True) if stands else self.fall.relax(remaining.place)
         continued = self._continue_from(remaining, end) if at_rest else self._remove_fallen(remaining, end)
         if continued is None:
             self._remove_blocks(before)
