@@ -400,15 +400,17 @@ class Path:
         measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
-        if not self._is_on_path(state, new, error.moved, refining):
+        at_rest = self._on_path(state, new, error.moved, refining)
+        if at_rest is None:
             if not enclosing:
                 return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
+        rested, new = at_rest is not new, at_rest
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
         # What supports took within a long step is nearer to the mean of the forces.
         works = (*works[:2], (works[2] + self._work_on_supports(place, motion)) / 2.0, works[3])
         new = replace(new, s=s, works=tuple(np.add(place.works, (*works, sum(map(abs, works)))).tolist()))
-        history = (*state.history[:1], *state.history[1:][-5:], place)
+        history = (new,) if rested else (*state.history[:1], *state.history[1:][-5:], place)
         state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
@@ -441,24 +443,25 @@ class Path:
         # A step that was cut at its target does not shorten the next.
         return min(LONGEST_STEP * self.stepper.unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
-    def _is_on_path(self, state: PathState, new: Place, moved: float, refining: bool) -> bool:
+    def _on_path(self, state: PathState, new: Place, moved: float, refining: bool) -> Place | None:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
         if self.model.has_live and new.multiplier <= 0.0 and new.s > self._onset():
-            return False
+            return None
         # What creeps moves little in a step that is short, and far in several.
         fast = moved > LONGEST_STEP or any(
             self.fall.movements(place, new).max() > max(FAST * (new.s - place.s) / self.stepper.unit, MECHANISM)
             for place in (state.place, *state.history)
         )
         if not (fast or refining):
-            return True
+            return new
         # What jumps is followed in time, however little viscosity there is.
         if refining and moved > JUMP:
-            return False
+            return None
         # Of a live load that has viscosity in it more than a step may err by.
-        carries = self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance))
+        if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
+            return new
         # Blocks that the viscosity retards may come to rest nearby.
-        return carries or (not refining and self.fall.relaxed(new, JUMP) is not None)
+        return None if refining else self.fall.relaxed(new, JUMP)
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
         """Go back to the last place in equilibrium from a parameter that has none."""
