@@ -405,7 +405,7 @@ class Path:
             if not enclosing:
                 return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
-        rested, new = at_rest is not new, at_rest
+        rested, new = at_rest is not new, replace(at_rest, velocity=new.velocity if at_rest is new else place.velocity)
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
         # What supports took within a long step is nearer to the mean of the forces.
         works = (*works[:2], (works[2] + self._work_on_supports(place, motion)) / 2.0, works[3])
