@@ -58,7 +58,7 @@ def case_assembly(case: Case) -> solver.Assembly:
     sketch = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[0]
     _refuse_doubted_unit(case, sketch)
     sketch = with_roles_by_place(sketch, case.role_places)
-    _refuse_shared_names(case, sketch)
+    _check_shared_names(case, sketch)
     _note_kept(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
@@ -98,15 +98,20 @@ def case_assembly(case: Case) -> solver.Assembly:
     return imperfect(assembly, case.imperfections)
 
 
-def _refuse_shared_names(case: Case, sketch: layout.Layout) -> None:
-    """Refuse a support of given stiffness, which it has by its name, that is called as another or a block."""
+def _check_shared_names(case: Case, sketch: layout.Layout) -> None:
+    """Say which supports have a name that is taken; refuse one of given stiffness, which it has by its name."""
     names = [*sketch.names, *(support["name"] for support in case.supports)]
-    for name in case.ground:
-        if names.count(name) > 1:
-            raise ValueError(
-                f"{case.source}: [supports] name: '{name}' is the name of another support or block; give each support "
-                "a name of its own"
-            )
+    for name in dict.fromkeys(support["name"] for support in case.supports):
+        if names.count(name) < 2:
+            continue
+        said = f"{case.source}: [supports] name: '{name}' is the name of another support or block"
+        if name in case.ground:
+            raise ValueError(f"{said}; give each support a name of its own")
+        warnings.warn(
+            f"{said}: what is said of '{name}' holds for all {names.count(name)}, and results number them "
+            f"('{name} #2'); give each support a name of its own",
+            stacklevel=3,
+        )
 
 
 def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
