@@ -134,12 +134,12 @@ def _drawn_in_plane(
         scene.arrows("arrow", tails, tips, palette.SETTLEMENT)
     picture = scene.image()
     if main:
-        lines = [joints.ends[crack.joints] for crack in cracks]
-        dots = along_lines(np.concatenate([*lines, np.stack([tails, tips], axis=1)]))
+        dots = along_lines(np.concatenate([joints.ends[crack.joints] for crack in cracks]))
+        arrows = np.stack([scene.at_pixel(tails), scene.at_pixel(tips)], axis=1)
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
         words = [f"{n}: {width_text(crack.width)}" for n, crack in zip(_numbers(main, cracks), main, strict=True)]
         colours = palette.SURVEYED[: len(main)]
-        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours)
+        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours, arrows)
     named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
     keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:

@@ -25,7 +25,6 @@ from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text,
 from .flat_scene import FlatScene
 from .frame import (
     BAR,
-    CROSSED,
     CURVE,
     SEPARATOR,
     STILL_SIZE,
@@ -220,8 +219,8 @@ class Drawer:
         self._acting: dict[tuple[int, float], bool] = {}
         #: Where the blocks are drawn while a mechanism is shown.
         self._drawn_at: solver.Pose | None = None
-        #: Points (n, d) [m] along the arrows in the picture, by layer: labels leave them free.
-        self._along_arrows: dict[str, np.ndarray] = {}
+        #: Ends (n, 2, d) [m] of the arrows in the picture, by layer: labels leave them free.
+        self._arrows: dict[str, np.ndarray] = {}
         self._keys: list[Key] | None = None
 
     def _chosen_views(self) -> tuple[View, ...]:
@@ -435,7 +434,7 @@ class Drawer:
         lengths = np.linalg.norm(tips - tails, axis=1)
         shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
         tails, tips = tails[shown], tips[shown]
-        self._along_arrows["motion"] = _along(tails, tips)
+        self._arrows["motion"] = np.stack([tails, tips], axis=1)
         self._swing, self.tints = swing, mechanism_colours(self.assembly, self.fill, swing)
         self._drawn_at = self.scene.show_motion(swing, tails, tips)
 
@@ -614,9 +613,11 @@ class Drawer:
             across = along_lines(found.cracks[:, [0, 3]]), along_lines(found.cracks[:, [1, 2]])
             dots = np.concatenate([dots, along_lines(np.stack(across, axis=1))])
         if words:
-            dots = np.concatenate([dots, *self._along_arrows.values(), self.ties.along(increment, shown)])
-            places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)
-            write_labels(picture, places, words, self.sheet.text, dots, colours)
+            dots = np.concatenate([dots, self.ties.along(increment, shown)])
+            arrows = np.concatenate([np.zeros((0, 2, dots.shape[1])), *self._arrows.values()])
+            at = self.scene.at_pixel
+            ends = at(arrows.reshape(-1, dots.shape[1])).reshape(-1, 2, 2)
+            write_labels(picture, at(points), words, self.sheet.text, at(dots), colours, ends)
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.force_scale == 0.0:
@@ -674,7 +675,7 @@ class Drawer:
         self._draw_arrows("live", tails, tips, palette.LIVE)
 
     def _draw_arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
-        self._along_arrows[layer] = _along(tails, tips)
+        self._arrows[layer] = np.stack([tails, tips], axis=1)
         self.scene.arrows(layer, tails, tips, colour)
 
     def _settlement_arrows(
@@ -692,11 +693,6 @@ class Drawer:
         places, directions = places[kept], directions[kept]
         places = places + into_sight(self._plane, places)
         return places, places + self._arrow * directions
-
-
-def _along(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:
-    """(n, d) array [m]: points along arrows, so many that a label over one is as bad as over its own place."""
-    return np.repeat(along_lines(np.stack([tails, tips], axis=1)), CROSSED, axis=0)
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:

@@ -375,6 +375,16 @@ def test_widths_leave_hinges_free_where_there_is_room():
         assert np.any(np.asarray(picture) != (0, 128, 0)), "it is written in any case"
 
 
+def test_no_leader_crosses_an_arrow_where_there_is_room():
+    """The label lay beyond the arrow, where it covers nothing."""
+    place, arrow = np.array([[50.0, 50.0]]), np.array([[[60.0, 20.0], [60.0, 80.0]]])
+    dots = np.array([[x, y] for x in (5.0, 20.0, 35.0, 50.0) for y in (30.0, 50.0, 70.0)])
+    for arrows, crossed in ((arrow, False), (arrow[:0], True)):
+        picture = Image.new("RGB", (200, 100), "green")
+        write_labels(picture, place, ["9 mm"], 10, dots, arrows=arrows)
+        assert np.any(np.asarray(picture)[20:80, 60] != (0, 128, 0)) == crossed
+
+
 def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
     marked = []
     found = drawing.marks_of
