@@ -194,7 +194,7 @@ def _note_kept(case: Case, sketch: layout.Layout) -> None:
 
 
 def _note_units(case: Case, assembly: solver.Assembly) -> None:
-    """Warn of numbers that are probably in another unit."""
+    """Warn of numbers that are probably in another unit; refuse an increment of more than the whole structure."""
     sizes = np.sqrt(assembly.areas) if assembly.dimension == 2 else np.cbrt(assembly.shapes.volumes)
     sizes = sizes[assembly.free]
     notes = []
@@ -214,10 +214,13 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
     ):
         largest = max((getattr(s, key) for s in case.settlements if s.unit == "m"), default=0.0)
         if largest > most:
-            notes.append(
-                f"[settlement] {key} = {largest:g} m is {largest / size:.3g} times the {what}, {size:.3g} m: "
-                f"is it in mm? {1e-3 * largest:g} m"
-            )
+            said = f"[settlement] {key} = {largest:g} m is {largest / size:.3g} times the {what}, {size:.3g} m"
+            if key == "increment" and largest > whole:
+                raise ValueError(
+                    f"{case.source}: {said}, and the whole is {whole:.3g} m: if it is in mm, give {1e-3 * largest:g}, "
+                    f"else at most {whole:.3g}"
+                )
+            notes.append(f"{said}: is it in mm? {1e-3 * largest:g} m")
     middle = assembly.vertices.mean(axis=0)
     turns = {(s.rotation_centre, s.rotation_axis) for s in case.settlements if s.rotation_centre is not None}
     for centre, axis in sorted(turns):
