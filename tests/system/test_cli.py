@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import re
+import signal
 import shutil
 import subprocess
 import sys
@@ -425,3 +426,19 @@ def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_
     words = ["layout", "arch", "-o", str(tmp_path / "arch.json")]
     done = subprocess.run([sys.executable, "-c", stopped, *words], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (130, "blockvis: interrupted\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
+def test_ctrl_c_before_the_command_line_is_loaded_ends_without_a_traceback():
+    stopped = (
+        "import os, signal, sys\n"
+        "class Stop:\n"
+        "    @staticmethod\n"
+        "    def find_spec(name, *_):\n"
+        "        if name == 'blockvis.cli': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Stop)\n"
+        "from blockvis.__main__ import script\n"
+        "script()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", stopped, "--version"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
