@@ -146,7 +146,8 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
     styled = _styled(root)
-    originals = {element.get("id", ""): element for element in root.iter()}
+    # Of an id that is there twice, against the rules, programs show the first.
+    originals = {element.get("id", ""): element for element in reversed(list(root.iter()))}
     found = _Found(notes=[*doubts, *styled, *_pattern_fills(root)], originals=originals)
     if stated and stated not in UNITS and reading.unit is None:
         scale = f"1 unit of the drawing is {stated}, by its width and its viewBox"
@@ -326,7 +327,7 @@ def _originals(element: ElementTree.Element, found: _Found) -> list[ElementTree.
     called = element.get("href", element.get(f"{_XLINK}href", ""))
     original = found.originals.get(called.removeprefix("#"))
     symbol = original is not None and _tag(original) == "symbol"
-    if original is None or (_tag(original) in _UNDRAWN and not symbol):
+    if not called.strip("#") or original is None or (_tag(original) in _UNDRAWN and not symbol):
         found.skipped["<use> (clones; unlink them to have them read)"] += 1
         return []
     # Clones within clones, ten of each ten, can fill any memory.

@@ -12,7 +12,7 @@ from PIL import Image
 
 import solver
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.about import phases_of
+from blockvis.results.about import settlement_in
 from blockvis.results.cracks import Crack, cracks_of, main_cracks, slid_joints
 from blockvis.results.joint_faces import InitialJoints, initial_joints
 from blockvis.results.joints import carried_faces, opening_and_slip
@@ -127,10 +127,9 @@ def _drawn_in_plane(
     for k, (crack, colour) in list(enumerate(layers))[::-1]:
         half = (thin + (thick - thin) * openings[crack.joints] / widest) / 2.0
         scene.polygons(f"crack edge/{k}", _bars(joints.ends[crack.joints], half), colour)
-    tails, tips, phases = *np.zeros((2, 0, 2)), phases_of(response)
-    if phases:
-        phase = phases[min(increment.phase, len(phases) - 1)]
-        tails, tips = arrows_on_supports(assembly, phase, start, frame, ARROW * float(frame.size.max()))
+    (tails, tips), settlement = np.zeros((2, 0, 2)), settlement_in(response, increment.phase)
+    if settlement is not None:
+        tails, tips = arrows_on_supports(assembly, settlement, start, frame, ARROW * float(frame.size.max()))
         scene.arrows("arrow", tails, tips, palette.SETTLEMENT)
     picture = scene.image()
     if main:

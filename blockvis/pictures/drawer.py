@@ -13,7 +13,7 @@ from PIL import Image
 import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.about import phases_of
+from blockvis.results.about import phases_of, settlement_in
 from blockvis.results.cracks import cracks_of, main_areas
 from blockvis.results.joint_faces import initial_joints
 from blockvis.text import force_text, rounded_length, width_text
@@ -74,8 +74,7 @@ DOT = 0.5
 #: Blocks in space are so transparent where forces are drawn inside them.
 GLASS = 0.35
 
-#: Length of the arrows at the supports, as a part of the larger side of what is drawn, in the plane and in space;
-#: in the plane none is longer than its support, to a third.
+#: Length of the arrows at the supports in space, as a part of the larger side of what is drawn.
 ARROW_IN_SPACE = 0.09
 
 #: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
@@ -682,13 +681,12 @@ class Drawer:
         self, increment: solver.Increment, shown: solver.Pose, seen: Frame | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tails and tips (n, d) [m] of the arrows at supports: in the plane on them, in space out of them."""
-        phases = phases_of(self.response)
-        if not phases:
+        settlement = settlement_in(self.response, increment.phase)
+        if settlement is None:
             return np.zeros((0, self.assembly.dimension)), np.zeros((0, self.assembly.dimension))
-        phase = phases[min(increment.phase, len(phases) - 1)]
         if self._flat:
-            return arrows_on_supports(self.assembly, phase, shown, seen, self._arrow)
-        blocks, places, directions = settlement_arrows(self.assembly, phase, shown)
+            return arrows_on_supports(self.assembly, settlement, shown, seen, self._arrow)
+        blocks, places, directions = settlement_arrows(self.assembly, settlement, shown)
         kept = kept_blocks(self._plane, self.assembly, shown)[blocks]
         places, directions = places[kept], directions[kept]
         places = places + into_sight(self._plane, places)
