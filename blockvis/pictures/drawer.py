@@ -612,10 +612,8 @@ class Drawer:
             across = along_lines(found.cracks[:, [0, 3]]), along_lines(found.cracks[:, [1, 2]])
             dots = np.concatenate([dots, along_lines(np.stack(across, axis=1))])
         if words:
-            dots = np.concatenate([dots, self.ties.along(increment, shown)])
-            arrows = np.concatenate([np.zeros((0, 2, dots.shape[1])), *self._arrows.values()])
-            at = self.scene.at_pixel
-            ends = at(arrows.reshape(-1, dots.shape[1])).reshape(-1, 2, 2)
+            at, ends = self.scene.at_pixel, np.concatenate([*self._arrows.values(), self.ties.lines(increment, shown)])
+            ends = at(ends.reshape(-1, points.shape[1])).reshape(-1, 2, 2)
             write_labels(picture, at(points), words, self.sheet.text, at(dots), colours, ends)
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:

@@ -203,9 +203,7 @@ def _place(increment: solver.Increment) -> tuple[int, float]:
     return increment.phase, increment.parameter
 
 
-def _entry(
-    assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray, *, inside: bool
-) -> np.ndarray:
+def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray, *, inside: bool) -> np.ndarray:
     """Where the line of a load enters its block; the centroid, where it acts inside and has no moment about that."""
     centre, force, moment = pose.positions[block], load[:2], float(load[2])
     size = float(np.hypot(*force))

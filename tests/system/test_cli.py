@@ -4,8 +4,8 @@ import csv
 import json
 import os
 import re
-import signal
 import shutil
+import signal
 import subprocess
 import sys
 from importlib.metadata import version

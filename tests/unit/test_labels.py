@@ -381,7 +381,7 @@ def test_no_leader_crosses_an_arrow_where_there_is_room():
     dots = np.array([[x, y] for x in (5.0, 20.0, 35.0, 50.0) for y in (30.0, 50.0, 70.0)])
     for arrows, crossed in ((arrow, False), (arrow[:0], True)):
         picture = Image.new("RGB", (200, 100), "green")
-        write_labels(picture, place, ["9 mm"], 10, dots, arrows=arrows)
+        write_labels(picture, place, ["9 mm"], 10, dots, lines=arrows)
         assert np.any(np.asarray(picture)[20:80, 60] != (0, 128, 0)) == crossed
 
 
