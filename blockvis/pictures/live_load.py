@@ -79,13 +79,11 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         arms = np.cross(units, live[blocks, 3:] / size[blocks, None])
         points = leaving(assembly, pose, blocks, pose.positions[blocks] + arms, -units)
     else:
-        given = response.loads_at(increment)
+        given, arms = response.loads_at(increment).live, response.loads_at(increment).live_arms
         # A load without an arm that is known acts on the mass of its block, or at its centroid.
-        inside = given.live[:, :2].any(axis=1)
-        if given.live_arms is not None:
-            inside &= ~given.live_arms.any(axis=(1, 2))
-        points = [_entry(assembly, pose, int(block), live[block], inside=bool(inside[block])) for block in blocks]
-        points = np.reshape(points, (-1, 2))
+        inside = [bool(given[b, :2].any()) and (arms is None or not arms[b].any()) for b in blocks.tolist()]
+        entries = zip(blocks.tolist(), inside, strict=True)
+        points = np.reshape([_entry(assembly, pose, b, live[b], inside=within) for b, within in entries], (-1, 2))
     load = LiveLoad(points, forces[blocks], blocks, pose, len(acting))
     return load if len(blocks) <= MOST_ARROWS else _gathered(load, CELL * extent)
 

@@ -269,8 +269,8 @@ def _draw_shape(axes: Axes, shape: dict[str, np.ndarray], low: np.ndarray, high:
     cuts = shape["offsets"][1:-1]
     ghost = [ring for ring, free in zip(np.split(shape["at_rest"], cuts), shape["free"], strict=True) if free]
     axes.add_collection(PolyCollection(ghost, facecolor="none", edgecolor="#cfcfcf", linewidth=0.5, zorder=1))
-    axes.add_collection(PolyCollection(shape.get("fill", ()), facecolor=palette.hexadecimal(palette.FILL), zorder=0.5))
-    rims = shape.get("fill_rims", ())
+    fill, rims = (list(shape.get(name, ())) for name in ("fill", "fill_rims"))
+    axes.add_collection(PolyCollection(fill, facecolor=palette.hexadecimal(palette.FILL), zorder=0.5))
     axes.add_collection(LineCollection(rims, color=palette.hexadecimal(palette.FILL_RIM), linewidth=1.2, zorder=0.6))
     # Ground that goes on beyond the picture ends before its edge, with an outline.
     inside = shapely.box(*(low + 0.25 * MARGIN * (high - low)), *(high - 0.25 * MARGIN * (high - low)))
