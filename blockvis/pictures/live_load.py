@@ -79,9 +79,10 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         arms = np.cross(units, live[blocks, 3:] / size[blocks, None])
         points = leaving(assembly, pose, blocks, pose.positions[blocks] + arms, -units)
     else:
-        given, arms = response.loads_at(increment).live, response.loads_at(increment).live_arms
+        given = response.loads_at(increment)
+        turning = np.zeros_like(given.live) if given.live_arms is None else given.live_arms
         # A load without an arm that is known acts on the mass of its block, or at its centroid.
-        inside = [bool(given[b, :2].any()) and (arms is None or not arms[b].any()) for b in blocks.tolist()]
+        inside = [bool(given.live[b, :2].any()) and not turning[b].any() for b in blocks.tolist()]
         entries = zip(blocks.tolist(), inside, strict=True)
         points = np.reshape([_entry(assembly, pose, b, live[b], inside=within) for b, within in entries], (-1, 2))
     load = LiveLoad(points, forces[blocks], blocks, pose, len(acting))
