@@ -387,12 +387,13 @@ def test_a_note_is_printed_once(case, capsys):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
-def test_a_second_ctrl_c_does_not_break_off_the_ending():
-    """What ends with the process, as the workers of a study, is not told as a traceback."""
+@pytest.mark.parametrize("told", ["cli.INTERRUPTED", "os.kill(os.getpid(), signal.SIGINT)"])
+def test_a_second_ctrl_c_does_not_break_off_the_ending(told):
+    """What ends with the process, as the workers of a study, is no traceback, and neither is one while it is told."""
     ending = (
         "import atexit, os, signal\nfrom blockvis import cli\n"
         "atexit.register(os.kill, os.getpid(), signal.SIGINT)\n"
-        "cli.main = lambda: cli.INTERRUPTED\ncli.entry()\n"
+        f"cli.main = lambda: {told}\ncli.entry()\n"
     )
     done = subprocess.run([sys.executable, "-c", ending], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (cli.INTERRUPTED, "")
