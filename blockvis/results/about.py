@@ -236,7 +236,7 @@ def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
 
 def losing(response: solver.Response) -> solver.Increment | None:
     """Find the increment from which the collapse mechanism takes blocks; None where a response loses no equilibrium."""
-    lost = response.collapse is not None and response.collapse.lost == "equilibrium"
+    lost = response.collapse is not None and response.collapse.lost != "capacity"
     return with_mechanism(response) if lost else None
 
 

@@ -131,7 +131,8 @@ class Reports:
         """The ending that names the wedged blocks."""
         normal = place.forces[:, 0]
         assert place.contacts is not None
-        return Ending(Status.LOCKED, wedged(self.model.assembly, place.contacts[normal > 0.1 * normal.max()]))
+        words = wedged(self.model.assembly, place.contacts[normal > 0.1 * normal.max()])
+        return Ending(Status.LOCKED, f"{words} at {place.s:.6g} {self.driver.unit}")
 
     def no_step(self, s: float, reason: str) -> Ending:
         """The ending at a step that was not solved, from a parameter s [m or rad]."""
