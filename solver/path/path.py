@@ -452,8 +452,8 @@ class Path:
         )
         if not (fast or refining):
             return True
-        # What jumps is followed in time, however little viscosity there is.
-        if refining and moved > JUMP:
+        # What jumps farther than supports move is followed in time, however little viscosity there is.
+        if refining and moved > max(JUMP, FAST * (new.s - state.place.s) / self.stepper.unit):
             return False
         # Of a live load that has viscosity in it more than a step may err by.
         carries = self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance))
