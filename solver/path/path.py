@@ -399,7 +399,7 @@ class Path:
             of_friction = min(of_friction, 1.0)
         measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
         if measure > REFUSED and length > FIRST_STEP * unit:
-            return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
+            return replace(state, step=length / 4.0), None
         if not self._is_on_path(state, new, error.moved, refining):
             if not enclosing:
                 return self._go_back(state, new.s), None
