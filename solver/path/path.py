@@ -394,7 +394,7 @@ class Path:
             of_friction = min(of_friction, 1.0)
         measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
         if measure > REFUSED and length > FIRST_STEP * unit:
-            return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
+            return replace(state, step=length / 4.0), None
         if not self._is_on_path(state, new, error.moved, refining):
             if not enclosing:
                 return self._go_back(state, new.s), None
@@ -449,8 +449,8 @@ class Path:
         )
         if not (fast or refining):
             return True
-        # What jumps is followed in time, however little viscosity there is.
-        if refining and moved > JUMP:
+        # What jumps farther than supports move is followed in time, however little viscosity there is.
+        if refining and moved > max(JUMP, FAST * (new.s - state.place.s) / self.stepper.unit):
             return False
         # Of a live load that has viscosity in it more than a step may err by.
         carries = self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance))
