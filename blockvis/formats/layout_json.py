@@ -117,8 +117,8 @@ def _solid(block: Any, called: str) -> Solid:
         faces = [[int(corner) for corner in face] for face in block["faces"]]
     except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(
-            f"{called} has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; give both, of each block, or of blocks "
-            "in the plane an outline [[x, y], ...] instead"
+            f"{called} has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; give both, of each block, or in the "
+            "plane an outline [[x, y], ...] instead"
         ) from None
     outside = [corner for face in faces for corner in face if not 0 <= corner < len(points)]
     if outside:
