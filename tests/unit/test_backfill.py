@@ -17,7 +17,7 @@ from blockvis import draw_still, lay_backfill, run_case
 WEIGHT = 10.0
 
 
-def lay(assembly: solver.Assembly, over: str, surface: float, coefficient: float = 0.0) -> solver.Backfill:
+def lay(assembly: solver.Assembly, over: str | list[str], surface: float, coefficient: float = 0.0) -> solver.Backfill:
     return lay_backfill(assembly, over, surface, WEIGHT, coefficient)
 
 
