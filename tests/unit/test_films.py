@@ -31,7 +31,7 @@ from blockvis import animate
 from blockvis.pictures import video
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of, state_at
-from blockvis.pictures.live_load import LiveLoads, live_load_of
+from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.video import write_film
 from blockvis.results.folder import VIDEO_SUFFIXES
@@ -166,11 +166,11 @@ def test_what_a_limit_load_is_without_bears_no_load():
     amount = 1e-3 * limit.multiplier * 1000.0
     forces = state.state.forces.copy()
     forces[1, 1] += amount
-    rough = replace(state, held=replace(state.state, forces=forces))
-    assert len(live_load_of(limit.response, rough, 3.0).blocks) == 2
+    rough = replace(state, parameter=1.0, held=replace(state.state, forces=forces))
+    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 2
     residual = 2.0 * amount / mechanics.total_weight(assembly)
     rough = replace(rough, certificate=replace(state.certificate, equilibrium_residual=residual))
-    assert len(live_load_of(limit.response, rough, 3.0).blocks) == 1
+    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 1
 
 
 @pytest.mark.slow
