@@ -66,12 +66,14 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     if not (standing and finite):
         nowhere = np.zeros((0, assembly.dimension))
         return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), pose)
-    live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + response.dead_at(increment))
-    live -= _of_ties(response, increment)
+    dead = response.dead_at(increment)
+    live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + dead + _of_ties(response, increment))
     live[~assembly.free | increment.fallen] = 0.0
     forces = live[:, : assembly.dimension]
     size = np.linalg.norm(forces, axis=1)
-    blocks = acting = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
+    # What is out of balance would be a load, too, where a pushover ends with hardly any.
+    unbalanced = increment.certificate.equilibrium_residual * np.abs(dead[assembly.free, : assembly.dimension]).sum()
+    blocks = acting = np.flatnonzero(size > max(ROUNDING * np.abs(live).max(initial=0.0), 2.0 * unbalanced))
     if assembly.dimension == 3:
         blocks = _largest(acting, size[acting])
         # The moment about the centroid tells the line on which a load acts, all but its place along that.

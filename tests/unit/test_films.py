@@ -162,6 +162,15 @@ def test_what_a_limit_load_is_without_bears_no_load():
     tails, tips = LiveLoads(limit.response, [state], 3.0).arrows(state, state.pose)
     assert len(tips) == 1
     assert tips[0, 1] == tails[0, 1]
+    # Where hardly any load is left what is out of balance is none, here a thousandth of it on each block.
+    amount = 1e-3 * limit.multiplier * 1000.0
+    forces = state.state.forces.copy()
+    forces[1, 1] += amount
+    rough = replace(state, parameter=1.0, held=replace(state.state, forces=forces))
+    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 2
+    residual = 2.0 * amount / mechanics.total_weight(assembly)
+    rough = replace(rough, certificate=replace(state.certificate, equilibrium_residual=residual))
+    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 1
 
 
 def test_pressure_is_drawn_on_the_face_that_it_meets():
