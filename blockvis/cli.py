@@ -210,6 +210,9 @@ def entry() -> None:
             # A help ends so; what it said may not have gone out yet.
             code = int(ended.code or 0)
         sys.stdout.flush()
+    except KeyboardInterrupt:
+        # A second one, while the first is told.
+        code = INTERRUPTED
     except OSError as error:
         if not (is_broken_pipe(error) or error.filename == OUTPUT):
             raise

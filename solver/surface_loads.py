@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .assembly import Assembly
 from .loads import PointForces, chosen_blocks
+from .tolerances import COMPUTED_GAP
 from .words import numbers_of, plain
 
 
@@ -39,8 +40,7 @@ def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> Po
     if not 0 <= edge < len(ring):
         raise ValueError(f"block '{assembly.names[block]}' has {len(ring)} edges; edge {edge} is none of them")
     start, stop = ring[edge], ring[(edge + 1) % len(ring)]
-    along = stop - start
-    inward = np.array([-along[1], along[0]])
+    inward = np.array([start[1] - stop[1], stop[0] - start[0]])
     force = plain(pressure, "float", "pressure") * float(assembly.thickness[block]) * inward
     return PointForces.at(block, force, (start + stop) / 2.0)
 
@@ -101,7 +101,7 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
     ----------
     assembly : Assembly
     x : float [m]
-        Strictly within a block, seen from above; between two the one to the left carries it.
+        Where two blocks meet, seen from above, the higher one carries it, of level ones that to the left.
     force : (2,) sequence [N]
 
     Returns
@@ -120,17 +120,18 @@ def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1
     """Put a force on the topmost surface at a place, which goes with its block; as :func:`load_on_top`."""
     x = plain(x, "float", "x")
     strips, _, edges = _first_met(assembly, np.array([0.0, -1.0]), np.array([1.0, 0.0]))
-    edge = int(edges[np.clip(np.searchsorted(strips, x) - 1, 0, len(edges) - 1)])
-    if not strips[0] <= x <= strips[-1] or edge < 0:
+    near = COMPUTED_GAP * assembly.block_size
+    met = np.pad(edges, 1, constant_values=-1)[np.searchsorted(strips, [x - near, x + near])]
+    if len(met := met[met >= 0]) == 0:
         raise ValueError(
             f"nothing is below a load at x = {x:g} m; the structure reaches from {strips[0]:g} to {strips[-1]:g} m"
         )
-    owner = int(assembly.block_of_vertex[edge])
-    if not assembly.free[owner]:
+    (x0, y0), (x1, y1) = assembly.vertices[met].T, assembly.vertices[assembly.polygons.next_vertex[met]].T
+    tops = y0 + (x - x0) / (x1 - x0) * (y1 - y0)
+    first = int(np.argmax(tops >= tops.max() - near))
+    if not assembly.free[owner := int(assembly.block_of_vertex[met[first]])]:
         raise ValueError(f"the load at x = {x:g} m stands on the support '{assembly.names[owner]}'")
-    start, stop = assembly.vertices[[edge, assembly.polygons.next_vertex[edge]]]
-    top = start[1] + (x - start[0]) / (stop[0] - start[0]) * (stop[1] - start[1])
-    return PointForces.at(owner, force, (x, float(top)))
+    return PointForces.at(owner, force, (x, float(tops[first])))
 
 
 def _first_met(
@@ -147,9 +148,8 @@ def _first_met(
     # Narrower ones are rounding of the drawing.
     strips = strips[np.append(True, np.diff(strips) > 1e-12 * (strips[-1] - strips[0]))]
     centre = (strips[:-1] + strips[1:]) / 2.0
-    low, high = np.minimum(a, b), np.maximum(a, b)
     depth, met = np.full(len(centre), np.inf), np.full(len(centre), -1)
-    first, last = np.searchsorted(centre, low), np.searchsorted(centre, high)
+    first, last = np.searchsorted(centre, np.minimum(a, b)), np.searchsorted(centre, np.maximum(a, b))
     there = True if removed is None else ~removed[assembly.block_of_vertex]
     for edge in np.flatnonzero((last > first) & there).tolist():
         under = slice(int(first[edge]), int(last[edge]))

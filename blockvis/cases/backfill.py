@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -126,6 +127,10 @@ def lay_backfill(
     pieces, block = _extrados(assembly, _chosen(names, assembly, where), surface)
     if not len(pieces):
         raise ValueError(f"{where} over: none of '{listed(names)}' looks up to the surface; name the topmost blocks")
+    bare = [f"'{name}'" for name in names if not np.isin(blocks_matching(name, assembly, where), block).any()]
+    if bare:
+        words = f"no fill lies on {listed(bare)}: no free block of that name looks up to the surface"
+        warnings.warn(f"{where} over: {words}; name the topmost blocks", stacklevel=2)
     heights = pieces[:, :, -1].max(axis=1)
     highest = int(heights.argmax())
     if heights[highest] > surface + ON_EDGE * assembly.block_size:

@@ -58,7 +58,7 @@ def case_assembly(case: Case) -> solver.Assembly:
     sketch = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[0]
     _refuse_doubted_unit(case, sketch)
     sketch = with_roles_by_place(sketch, case.role_places)
-    _refuse_shared_names(case, sketch)
+    _check_shared_names(case, sketch)
     _note_kept(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
@@ -98,15 +98,20 @@ def case_assembly(case: Case) -> solver.Assembly:
     return imperfect(assembly, case.imperfections)
 
 
-def _refuse_shared_names(case: Case, sketch: layout.Layout) -> None:
-    """Refuse a support of given stiffness, which it has by its name, that is called as another or a block."""
+def _check_shared_names(case: Case, sketch: layout.Layout) -> None:
+    """Say which supports have a name that is taken; refuse one of given stiffness, which it has by its name."""
     names = [*sketch.names, *(support["name"] for support in case.supports)]
-    for name in case.ground:
-        if names.count(name) > 1:
-            raise ValueError(
-                f"{case.source}: [supports] name: '{name}' is the name of another support or block; give each support "
-                "a name of its own"
-            )
+    for name in dict.fromkeys(support["name"] for support in case.supports):
+        if names.count(name) < 2:
+            continue
+        said = f"{case.source}: [supports] name: '{name}' is the name of another support or block"
+        if name in case.ground:
+            raise ValueError(f"{said}; give each support a name of its own")
+        warnings.warn(
+            f"{said}: what is said of '{name}' holds for all {names.count(name)}, and results number them "
+            f"('{name} #2'); give each support a name of its own",
+            stacklevel=3,
+        )
 
 
 def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
@@ -189,7 +194,7 @@ def _note_kept(case: Case, sketch: layout.Layout) -> None:
 
 
 def _note_units(case: Case, assembly: solver.Assembly) -> None:
-    """Warn of numbers that are probably in another unit."""
+    """Warn of numbers that are probably in another unit; refuse an increment of more than the whole structure."""
     sizes = np.sqrt(assembly.areas) if assembly.dimension == 2 else np.cbrt(assembly.shapes.volumes)
     sizes = sizes[assembly.free]
     notes = []
@@ -209,10 +214,13 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
     ):
         largest = max((getattr(s, key) for s in case.settlements if s.unit == "m"), default=0.0)
         if largest > most:
-            notes.append(
-                f"[settlement] {key} = {largest:g} m is {largest / size:.3g} times the {what}, {size:.3g} m: "
-                f"is it in mm? {1e-3 * largest:g} m"
-            )
+            said = f"[settlement] {key} = {largest:g} m is {largest / size:.3g} times the {what}, {size:.3g} m"
+            if key == "increment" and largest > whole:
+                raise ValueError(
+                    f"{case.source}: {said}, and the whole is {whole:.3g} m: if it is in mm, give {1e-3 * largest:g}, "
+                    f"else at most {whole:.3g}"
+                )
+            notes.append(f"{said}: is it in mm? {1e-3 * largest:g} m")
     middle = assembly.vertices.mean(axis=0)
     turns = {(s.rotation_centre, s.rotation_axis) for s in case.settlements if s.rotation_centre is not None}
     for centre, axis in sorted(turns):

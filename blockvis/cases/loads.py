@@ -55,7 +55,8 @@ def loads_of(
 
     Of a ``phase``, counted from 1, all loads that begin to act with it, without self-weight. Blocks that are ``gone``
     by then, (n_blocks,) bool array, neither carry loads nor shield others. ValueError for a pattern that matches no
-    free block that is left, a point in none of those it matches, and for an edge that a block does not have.
+    free block that is left, a point in none of those it matches, a pressure that meets none of them first, and for an
+    edge that a block does not have.
     """
     loads = solver.self_weight(assembly)
     # Loads of the drawing act on it before anything is taken away, but for a pressure, which meets what is left.
@@ -77,6 +78,11 @@ def loads_of(
                 loads = loads.with_forces(assembly, solver.PointForces.at(block, load.force, point), load.kind)
         if load.pressure is not None and load.edge is None:
             forces = solver.surface_forces(assembly, load.pressure, load.direction, blocks=chosen, removed=gone)
+            if len(forces.block) == 0:
+                raise ValueError(
+                    f"{source}: [loads {number + 1}] pressure along {list(load.direction)} meets none of "
+                    f"'{load.blocks}': other blocks are before them; name those that it meets first, or give force"
+                )
             loads = loads.with_forces(assembly, forces, load.kind)
         if load.pressure is not None and load.edge is not None:
             for block in chosen:

@@ -24,7 +24,7 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
-from blockvis.pictures.figures import plain_text, saved
+from blockvis.pictures.figures import plain_plot, plain_text, saved
 from blockvis.pictures.film import END, PAUSE
 from blockvis.pictures.frame import fitting_font, framed
 from blockvis.pictures.swing import shown_increments
@@ -80,9 +80,7 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
     axes.set_xlabel((parameter_label(longest) or "limit load") + below, fontsize=TEXT)
     axes.set_ylabel(value_label(largest), fontsize=TEXT)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    axes.ticklabel_format(useOffset=False, style="plain")
-    axes.grid(color="#e4e4e4", linewidth=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
+    plain_plot(axes, TEXT)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, fontsize=TEXT, frameon=False)
     return saved(figure, path, 200)
 

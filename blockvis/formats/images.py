@@ -39,8 +39,8 @@ MOST_SPECKS, SPECKS_OF_ONE = 200, 4
 #: Holes of no more than this fraction of a stone are filled.
 PINHOLES = 0.01
 
-#: A region of so many times the median area may be an opening, of a drawing of lines on paper, where each is one, of
-#: half as many: a door is four to six ashlars; so many are named.
+#: A region of so many times the median area may be an opening, and of half as many in a drawing of lines, whose
+#: openings are all regions, a door of four to six ashlars; so many are named.
 MAYBE_OPENING, NAMED = 8.0, 3
 
 #: What makes masks of photographs.

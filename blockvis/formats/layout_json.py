@@ -116,7 +116,10 @@ def _solid(block: Any, called: str) -> Solid:
         points = np.array(block["points"], dtype=float).reshape(-1, 3)
         faces = [[int(corner) for corner in face] for face in block["faces"]]
     except (KeyError, TypeError, ValueError, OverflowError):
-        raise ValueError(f"{called} has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; repair it") from None
+        raise ValueError(
+            f"{called} has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; give both, of each block, or in the "
+            "plane an outline [[x, y], ...] instead"
+        ) from None
     outside = [corner for face in faces for corner in face if not 0 <= corner < len(points)]
     if outside:
         raise ValueError(f"{called} is no closed block: a face uses point {outside[0]} of {len(points)}; repair it")

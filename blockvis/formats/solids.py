@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
-from blockvis.layout.layout import Layout
+from blockvis.layout.layout import Layout, solids_of
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import is_flat, spread_of
-from blockvis.layout.solids import BASE_FRAME, Solid, area_vectors, fans, prism, triangles_of
+from blockvis.layout.solids import BASE_FRAME, Solid, area_vectors, fans, triangles_of
 from blockvis.text import listed
 from solver import mechanics
 from solver.mechanics import counted
@@ -431,18 +431,13 @@ def _own_rows(path: Path) -> list[dict[str, Any]]:
 
 def write(layout: Layout, path: Path) -> None:
     """Write .stl, .obj or .ply as text, or .glb: blocks in space, or outlines extruded by their thickness, else 1 m."""
-    if layout.dimension == 3:
-        solids, what = list(layout.solids), "blocks in space, z is up, lengths in m"
-    else:
-        depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
-        solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
-        what = "blocks extruded by their thickness, lengths in m"
+    solids, in_space = solids_of(layout), layout.dimension == 3
     if path.suffix.lower() == ".glb":
         # y is up there, as it is in the plane.
-        in_space = layout.dimension == 3
         turned = [(points[:, [0, 2, 1]] * [1, 1, -1] if in_space else points, faces) for points, faces in solids]
         path.write_bytes(_glb(turned, rows_of(layout)))
         return
+    what = "blocks in space, z is up, lengths in m" if in_space else "blocks extruded by their thickness, lengths in m"
     lines = {".stl": _stl_lines, ".obj": _obj_lines, ".ply": _ply_lines}[path.suffix.lower()]
     path.write_text("\n".join([*lines(solids, rows_of(layout), what), ""]), encoding="utf-8")
 

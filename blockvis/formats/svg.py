@@ -146,7 +146,8 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
     styled = _styled(root)
-    originals = {element.get("id", ""): element for element in root.iter()}
+    # Of an id that is there twice, against the rules, programs show the first.
+    originals = {element.get("id", ""): element for element in reversed(list(root.iter()))}
     found = _Found(notes=[*doubts, *styled, *_pattern_fills(root)], originals=originals)
     if stated and stated not in UNITS and reading.unit is None:
         scale = f"1 unit of the drawing is {stated}, by its width and its viewBox"
@@ -322,16 +323,22 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
 
 
 def _originals(element: ElementTree.Element, found: _Found) -> list[ElementTree.Element]:
-    """Find what a clone shows; none of it where that is a symbol, or in another file."""
+    """Find what a clone shows, a symbol as an inner <svg> of the clone's size; none of it where that is elsewhere."""
     called = element.get("href", element.get(f"{_XLINK}href", ""))
     original = found.originals.get(called.removeprefix("#"))
-    if original is None or _tag(original) in _UNDRAWN:
+    symbol = original is not None and _tag(original) == "symbol"
+    if not called.strip("#") or original is None or (_tag(original) in _UNDRAWN and not symbol):
         found.skipped["<use> (clones; unlink them to have them read)"] += 1
         return []
     # Clones within clones, ten of each ten, can fill any memory.
     found.clones += 1
     if found.clones > MOST_CLONES:
         raise ValueError(f"it shows more than {MOST_CLONES} clones (<use>); unlink those that are blocks")
+    if symbol:
+        size = {side: element.attrib[side] for side in ("width", "height") if side in element.attrib}
+        shown = ElementTree.Element("svg", original.attrib | size)
+        shown.extend(original)
+        return [shown]
     return [original]
 
 

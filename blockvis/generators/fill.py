@@ -202,6 +202,8 @@ def filled(
     holes = _apart([*holes, *map(shapely.Polygon, wall.interiors), *_notches(solid, grid)])
     rest = _without(wall, holes if taken is None else [_shifted(taken, -corner), *holes], grid)
     area = rest.area
+    if not area:
+        raise ValueError("openings and holes leave nothing of the wall; leave them out, or draw the wall around them")
     bearing = length / 2.0 if pattern.bearing is None else pattern.bearing
     units = Units(length=length, height=height, bearing=bearing, grid=grid)
     stones, rest, lacking = _heads(holes, rest, pattern, units)
@@ -331,7 +333,7 @@ def _quoins(solid: shapely.Polygon, rest: shapely.Geometry, pattern: Pattern, gr
 def _without(wall: shapely.Geometry, parts: Sequence[shapely.Geometry], grid: float) -> shapely.Geometry:
     """Take parts out of a wall; a line that is left of it, as of an edge that both share on a grid, is none of it."""
     left = shapely.difference(wall, shapely.union_all(parts, grid_size=grid), grid_size=grid) if parts else wall
-    return shapely.multipolygons(pieces_of(left))
+    return shapely.MultiPolygon(pieces_of(left))
 
 
 def _note(what: str, openings: Sequence[shapely.Polygon], corner: np.ndarray) -> str:

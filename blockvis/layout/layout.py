@@ -16,7 +16,7 @@ from solver import mechanics
 from .left_out import LeftOut
 from .notes import CHANGED, Note
 from .outlines import ring_area
-from .solids import Solid, extruded, volume
+from .solids import Solid, extruded, prism, volume
 
 #: A block in the plane: (n, 2) corners in order [m], the first not repeated.
 Outline = np.ndarray
@@ -239,6 +239,14 @@ def standing(layout: Layout, thickness: float) -> Layout:
             Note(CHANGED, f"the drawing in the plane was extruded along y by {_depths(layout, thickness)}"),
         ),
     )
+
+
+def solids_of(layout: Layout) -> list[Solid]:
+    """List blocks in space; of outlines prisms as thick as these are, else 1 m, in front of the plane and behind it."""
+    if layout.dimension == 3:
+        return list(layout.solids)
+    depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
+    return [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
 
 
 def _depths(layout: Layout, thickness: float) -> str:

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 import solver
 from blockvis.dynamics.fall import Fall
 from blockvis.layout.block_table import rows_of
-from blockvis.layout.layout import layout_of
-from blockvis.layout.solids import BASE_FRAME, prism, triangles_of
+from blockvis.layout.layout import layout_of, solids_of
+from blockvis.layout.solids import BASE_FRAME, triangles_of
 from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
 
@@ -185,11 +185,6 @@ def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> Any:
     import trimesh
 
     layout = layout_of(assembly)
-    if layout.dimension == 3:
-        solids = list(layout.solids)
-    else:
-        depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
-        solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
     scene = trimesh.Scene(base_frame=BASE_FRAME)
 
     def add(name: str, mesh: trimesh.Trimesh, colour: Sequence[int]) -> None:
@@ -200,7 +195,7 @@ def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> Any:
         scene.add_geometry(mesh, node_name=name, geom_name=name)
 
     colours = palette.block_colours(assembly.materials, assembly.free).tolist()
-    rows = zip(assembly.names, solids, rows_of(layout), colours, strict=True)
+    rows = zip(assembly.names, solids_of(layout), rows_of(layout), colours, strict=True)
     for number, (name, (points, faces), row, colour) in enumerate(rows):
         about = points.copy()
         about[:, : assembly.dimension] -= assembly.centroids[number]

@@ -12,7 +12,7 @@ from PIL import Image
 
 import solver
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.about import phases_of
+from blockvis.results.about import settlement_in
 from blockvis.results.cracks import Crack, cracks_of, main_cracks, slid_joints
 from blockvis.results.joint_faces import InitialJoints, initial_joints
 from blockvis.results.joints import carried_faces, opening_and_slip
@@ -127,19 +127,18 @@ def _drawn_in_plane(
     for k, (crack, colour) in list(enumerate(layers))[::-1]:
         half = (thin + (thick - thin) * openings[crack.joints] / widest) / 2.0
         scene.polygons(f"crack edge/{k}", _bars(joints.ends[crack.joints], half), colour)
-    tails, tips, phases = *np.zeros((2, 0, 2)), phases_of(response)
-    if phases:
-        phase = phases[min(increment.phase, len(phases) - 1)]
-        tails, tips = arrows_on_supports(assembly, phase, start, frame, ARROW * float(frame.size.max()))
+    (tails, tips), settlement = np.zeros((2, 0, 2)), settlement_in(response, increment.phase)
+    if settlement is not None:
+        tails, tips = arrows_on_supports(assembly, settlement, start, frame, ARROW * float(frame.size.max()))
         scene.arrows("arrow", tails, tips, palette.SETTLEMENT)
     picture = scene.image()
     if main:
-        lines = [joints.ends[crack.joints] for crack in cracks]
-        dots = along_lines(np.concatenate([*lines, np.stack([tails, tips], axis=1)]))
+        dots = along_lines(np.concatenate([joints.ends[crack.joints] for crack in cracks]))
+        arrows = np.stack([scene.at_pixel(tails), scene.at_pixel(tips)], axis=1)
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
         words = [f"{n}: {width_text(crack.width)}" for n, crack in zip(_numbers(main, cracks), main, strict=True)]
         colours = palette.SURVEYED[: len(main)]
-        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours)
+        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours, arrows)
     named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
     keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:

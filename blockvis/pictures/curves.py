@@ -46,7 +46,7 @@ from .captions import (
     unit_for,
     value_label,
 )
-from .figures import plain_frame, plain_text, saved
+from .figures import plain_plot, plain_text, saved
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
@@ -189,7 +189,7 @@ class _Plot:
         """Draw it all, over the range of the reaction where that is known."""
         axes, response, text, known = self.axes, self.response, self.text, self.known
         axes.set_ylabel(value_label(response), fontsize=text)
-        _style(axes, text)
+        plain_plot(axes, text)
         axes.margins(x=0.02, y=0.12)
         if len(known) == 0 and len(response.path) > 1:
             axes.set_ylim(0.0, 1.0)
@@ -399,7 +399,7 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_ylabel(f"force of ties, tension + [{unit}]", fontsize=TEXT)
     axes.set_xlabel(parameter_label(response), fontsize=TEXT)
-    _style(axes, TEXT)
+    plain_plot(axes, TEXT)
     axes.margins(x=0.02, y=0.16)
     axes.legend(loc="best", fontsize=0.9 * TEXT, edgecolor="none", ncols=columns)
 
@@ -446,9 +446,3 @@ def _word(
 ) -> None:
     """Write words at a place, so many points to the right and up."""
     axes.annotate(words, place, offset, coordinates, "offset points", **style)
-
-
-def _style(axes: Axes, text: float) -> None:
-    """Give a plot numbers as they are, without a power of ten or an offset in the corner."""
-    plain_frame(axes, text)
-    axes.ticklabel_format(useOffset=False, style="plain")

@@ -13,7 +13,7 @@ from PIL import Image
 import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.about import phases_of
+from blockvis.results.about import phases_of, settlement_in
 from blockvis.results.cracks import cracks_of, main_areas
 from blockvis.results.joint_faces import initial_joints
 from blockvis.text import force_text, rounded_length, width_text
@@ -25,7 +25,6 @@ from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text,
 from .flat_scene import FlatScene
 from .frame import (
     BAR,
-    CROSSED,
     CURVE,
     SEPARATOR,
     STILL_SIZE,
@@ -75,8 +74,7 @@ DOT = 0.5
 #: Blocks in space are so transparent where forces are drawn inside them.
 GLASS = 0.35
 
-#: Length of the arrows at the supports, as a part of the larger side of what is drawn, in the plane and in space;
-#: in the plane none is longer than its support, to a third.
+#: Length of the arrows at the supports in space, as a part of the larger side of what is drawn.
 ARROW_IN_SPACE = 0.09
 
 #: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
@@ -220,8 +218,8 @@ class Drawer:
         self._acting: dict[tuple[int, float], bool] = {}
         #: Where the blocks are drawn while a mechanism is shown.
         self._drawn_at: solver.Pose | None = None
-        #: Points (n, d) [m] along the arrows in the picture, by layer: labels leave them free.
-        self._along_arrows: dict[str, np.ndarray] = {}
+        #: Ends (n, 2, d) [m] of the arrows in the picture, by layer: labels leave them free.
+        self._arrows: dict[str, np.ndarray] = {}
         self._keys: list[Key] | None = None
 
     def _chosen_views(self) -> tuple[View, ...]:
@@ -435,7 +433,7 @@ class Drawer:
         lengths = np.linalg.norm(tips - tails, axis=1)
         shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
         tails, tips = tails[shown], tips[shown]
-        self._along_arrows["motion"] = _along(tails, tips)
+        self._arrows["motion"] = np.stack([tails, tips], axis=1)
         self._swing, self.tints = swing, mechanism_colours(self.assembly, self.fill, swing)
         self._drawn_at = self.scene.show_motion(swing, tails, tips)
 
@@ -614,9 +612,9 @@ class Drawer:
             across = along_lines(found.cracks[:, [0, 3]]), along_lines(found.cracks[:, [1, 2]])
             dots = np.concatenate([dots, along_lines(np.stack(across, axis=1))])
         if words:
-            dots = np.concatenate([dots, *self._along_arrows.values(), self.ties.along(increment, shown)])
-            places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)
-            write_labels(picture, places, words, self.sheet.text, dots, colours)
+            at, ends = self.scene.at_pixel, np.concatenate([*self._arrows.values(), self.ties.lines(increment, shown)])
+            ends = at(ends.reshape(-1, points.shape[1])).reshape(-1, 2, 2)
+            write_labels(picture, at(points), words, self.sheet.text, at(dots), colours, ends)
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.force_scale == 0.0:
@@ -674,29 +672,23 @@ class Drawer:
         self._draw_arrows("live", tails, tips, palette.LIVE)
 
     def _draw_arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
-        self._along_arrows[layer] = _along(tails, tips)
+        self._arrows[layer] = np.stack([tails, tips], axis=1)
         self.scene.arrows(layer, tails, tips, colour)
 
     def _settlement_arrows(
         self, increment: solver.Increment, shown: solver.Pose, seen: Frame | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tails and tips (n, d) [m] of the arrows at supports: in the plane on them, in space out of them."""
-        phases = phases_of(self.response)
-        if not phases:
+        settlement = settlement_in(self.response, increment.phase)
+        if settlement is None:
             return np.zeros((0, self.assembly.dimension)), np.zeros((0, self.assembly.dimension))
-        phase = phases[min(increment.phase, len(phases) - 1)]
         if self._flat:
-            return arrows_on_supports(self.assembly, phase, shown, seen, self._arrow)
-        blocks, places, directions = settlement_arrows(self.assembly, phase, shown)
+            return arrows_on_supports(self.assembly, settlement, shown, seen, self._arrow)
+        blocks, places, directions = settlement_arrows(self.assembly, settlement, shown)
         kept = kept_blocks(self._plane, self.assembly, shown)[blocks]
         places, directions = places[kept], directions[kept]
         places = places + into_sight(self._plane, places)
         return places, places + self._arrow * directions
-
-
-def _along(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:
-    """(n, d) array [m]: points along arrows, so many that a label over one is as bad as over its own place."""
-    return np.repeat(along_lines(np.stack([tails, tips], axis=1)), CROSSED, axis=0)
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:

@@ -23,6 +23,12 @@ def plain_frame(axes: Axes, text: float) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
+def plain_plot(axes: Axes, text: float) -> None:
+    """Give a plot no frame, and numbers as they are, without a power of ten or an offset in the corner."""
+    plain_frame(axes, text)
+    axes.ticklabel_format(useOffset=False, style="plain")
+
+
 def saved(figure: Figure, path: str | os.PathLike[str], dpi: int, **options: Any) -> Path:
     """Save a figure, whole or not at all; options as of :meth:`matplotlib.figure.Figure.savefig`."""
     with atomic_file(path) as partial:

@@ -69,6 +69,7 @@ class FlatScene(Scene):
         self._paint(block_fill)
         self._layers["outline"] = _Layer(outline, *self._outlines, width=self._outline_width())
         self._hatch()
+        self._floor = np.inf
         self.pose(solver.Pose.initial(assembly))
 
     def holds(self, *layers: str) -> bool:
@@ -90,6 +91,8 @@ class FlatScene(Scene):
             moved = mechanics.carried(points, blocks, solver.Pose.initial(self.assembly), shown)
             moved[self._gone[blocks]] = self.frame.low - self.frame.size
             self._layers["hatch"].move(moved)
+        if np.isfinite(self._floor):
+            self._show_earth(corners)
 
     def lost(self, blocks: np.ndarray) -> None:
         """Edge blocks that have fallen, (n_blocks,) bool array, where they are drawn."""
@@ -208,7 +211,8 @@ class FlatScene(Scene):
         self.lines("ghost", edges[moving], palette.GHOST, self.usual_height / 800.0)
 
     def show_ground(self, height: float) -> None:
-        """Draw the ground of a fall over the whole width, hatched below, behind everything."""
+        """Draw the ground of a fall over the whole width, hatched below and up to supports, behind everything."""
+        self._floor = height
         tick = self.usual_height / 60.0 * self.pixel
         (left, _), (right, _) = self.frame.low, self.frame.high
         ends = np.array([[[left, height], [right, height]]])
@@ -217,6 +221,22 @@ class FlatScene(Scene):
         level = np.broadcast_to([height, height - tick], (len(x), 2))
         ticks = np.stack([np.stack([x, x - tick], axis=1), level], axis=2)
         self.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.usual_height / 1000.0))
+
+    def _show_earth(self, corners: np.ndarray) -> None:
+        """Hatch what lies below supports that are ground, as they reach below all free blocks: they would hang in air.
+
+        ``corners`` are those of the blocks, (n_vertices, 2) [m].
+        """
+        assembly, following = self.assembly, corners[self.assembly.polygons.next_vertex]
+        lowest = np.minimum.reduceat(assembly.vertices[:, 1], assembly.offsets[:-1])
+        ground = ~assembly.free & (lowest < lowest[assembly.free].min(initial=np.inf))
+        below = ground[assembly.block_of_vertex] & (following[:, 0] > corners[:, 0]) & (corners[:, 1] > self._floor)
+        top = np.stack([corners[below], following[below]], axis=1)
+        foot = np.stack([top[..., 0], np.full(top.shape[:2], self._floor)], axis=2)
+        spacing, thin = self.usual_height / 60.0 * self.pixel, max(0.7, self.usual_height / 1000.0)
+        found = [hatched(of, spacing, 1.0) for of in shapely.polygons(np.hstack([top, foot[:, ::-1]]))]
+        sides = np.stack([top, foot], axis=2).reshape(-1, 2, 2)
+        self.lines("earth/under", np.concatenate([sides, *found]), palette.HATCH, thin)
 
     def clear(self, *layers: str) -> None:
         """Remove layers, parts of them (after a "/") included."""

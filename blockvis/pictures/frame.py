@@ -46,8 +46,12 @@ SEPARATOR = "   ·   "
 #: How far labels lie from their places, in heights of the text: the nearest where there is room.
 LABELS_AWAY = (0.6, 1.8, 3.0)
 
-#: A label over the leader or the place of another is as bad as over so many dots.
-CROSSED = 10
+#: A label over the leader or the place of another, or its leader over an arrow or a tie, is as bad as over so many
+#: dots, and a label over one of these, which hides it.
+CROSSED, HIDDEN = 10, 50
+
+#: (n, 2, 2) array: the ends of no lines.
+NO_LINES = np.zeros((0, 2, 2))
 
 #: To which side a label may lie, to the right and down, the best first.
 BESIDE = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1))
@@ -256,11 +260,13 @@ def write_labels(
     text: int,
     dots: np.ndarray,
     colours: Sequence[tuple[int, int, int]] = (),
+    lines: np.ndarray = NO_LINES,
 ) -> None:
     """Write labels on paper beside places (n, 2) of a picture, in their order, each where none lies yet.
 
-    They leave dots (n, 2) free where there is room beside them, and each has a leader to its place. All lengths are in
-    pixels; the rims have the colour of open joints by default.
+    They leave dots (n, 2) and lines, such as arrows, with ends (n, 2, 2), free where there is room beside them, and
+    each has a leader to its place, which crosses no line. All lengths are in pixels; the rims have the colour of open
+    joints by default.
     """
     draw, font = ImageDraw.Draw(picture), _font(round(SMALL * text))
     rim, written = 0.4 * text, list[_Label]()
@@ -278,6 +284,11 @@ def write_labels(
         # A rim on the edge of the picture would be cut off.
         free = (lows >= rim).all(axis=1) & (lows + size <= picture.size - np.array(rim)).all(axis=1)
         cost = _inside(dots[:, None], lows - rim, lows + size + rim).sum(axis=0) + away / text
+        # What a label names may lie on a line, from which its leader goes.
+        starts = place + (rim / away)[:, None] * (nearest - place)
+        boxes, paths = shapely.box(*lows.T, *(lows + size).T), shapely.linestrings(np.stack([starts, nearest], axis=1))
+        for shapes, each, near in ((boxes, HIDDEN, rim), (paths, CROSSED, rim / 2.0)):
+            cost += each * shapely.dwithin(shapes[:, None], shapely.linestrings(lines), near).sum(axis=1)
         for other in written:
             free &= ~((lows < other.high) & (other.low < lows + size)).all(axis=1)
             over = _inside(other.leader[:, None], lows, lows + size).any(axis=0)

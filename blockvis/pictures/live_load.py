@@ -66,12 +66,14 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     if not (standing and finite):
         nowhere = np.zeros((0, assembly.dimension))
         return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), pose)
-    live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + response.dead_at(increment))
-    live -= _of_ties(response, increment)
+    dead = response.dead_at(increment)
+    live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + dead + _of_ties(response, increment))
     live[~assembly.free | increment.fallen] = 0.0
     forces = live[:, : assembly.dimension]
     size = np.linalg.norm(forces, axis=1)
-    blocks = acting = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
+    # What is out of balance would be a load, too, where a pushover ends with hardly any.
+    unbalanced = increment.certificate.equilibrium_residual * np.abs(dead[assembly.free, : assembly.dimension]).sum()
+    blocks = acting = np.flatnonzero(size > max(ROUNDING * np.abs(live).max(initial=0.0), 2.0 * unbalanced))
     if assembly.dimension == 3:
         blocks = _largest(acting, size[acting])
         # The moment about the centroid tells the line on which a load acts, all but its place along that.
@@ -79,7 +81,12 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         arms = np.cross(units, live[blocks, 3:] / size[blocks, None])
         points = leaving(assembly, pose, blocks, pose.positions[blocks] + arms, -units)
     else:
-        points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks]).reshape(-1, 2)
+        given = response.loads_at(increment)
+        turning = np.zeros_like(given.live) if given.live_arms is None else given.live_arms
+        # A load without an arm that is known acts on the mass of its block, or at its centroid.
+        inside = [bool(given.live[b, :2].any()) and not turning[b].any() for b in blocks.tolist()]
+        entries = zip(blocks.tolist(), inside, strict=True)
+        points = np.reshape([_entry(assembly, pose, b, live[b], inside=within) for b, within in entries], (-1, 2))
     load = LiveLoad(points, forces[blocks], blocks, pose, len(acting))
     return load if len(blocks) <= MOST_ARROWS else _gathered(load, CELL * extent)
 
@@ -197,11 +204,11 @@ def _place(increment: solver.Increment) -> tuple[int, float]:
     return increment.phase, increment.parameter
 
 
-def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray) -> np.ndarray:
-    """Where the line of a load enters its block; the centroid, where the load has no moment about it."""
+def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray, *, inside: bool) -> np.ndarray:
+    """Where the line of a load enters its block; the centroid, where it acts inside and has no moment about that."""
     centre, force, moment = pose.positions[block], load[:2], float(load[2])
     size = float(np.hypot(*force))
-    if abs(moment) < 1e-3 * size * assembly.block_size:
+    if inside and abs(moment) < 1e-3 * size * assembly.block_size:
         return centre
     through = centre + moment / size**2 * np.array([force[1], -force[0]])
     corners = mechanics.moved_vertices(assembly, pose)[assembly.offsets[block] : assembly.offsets[block + 1]]

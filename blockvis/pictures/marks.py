@@ -54,7 +54,8 @@ SHORTEST_ARROW = 2.0
 #: A support that turns has two arrows, so far from its middle as a part of its extent.
 END = 0.35
 
-#: Length of the arrows at supports in the plane, as a part of the larger side of what is drawn.
+#: Length of the arrows at supports in the plane, as a part of the larger side of what is drawn; none is longer than its
+#: support, to a third.
 ARROW = 0.055
 
 

@@ -46,9 +46,6 @@ EARTH = 3.0
 #: What a tie carries at rest is, below this part of the largest force, how the joints give and no number to tell.
 SMALLEST_TOLD = 1e-4
 
-#: Points along a tie that labels leave free.
-ALONG = 24
-
 #: Most ties that are named in a picture: those with the largest forces.
 MOST_NAMED = 6
 
@@ -90,12 +87,10 @@ class DrawnTies:
         ]
         return np.concatenate([np.zeros((0, self._assembly.dimension)), *found])
 
-    def along(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
-        """(n, d) array [m]: points along what is drawn of an increment, which labels leave free."""
+    def lines(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
+        """(n, 2, d) array [m]: ends of what is drawn of an increment, which labels leave free."""
         ends, left = self._left(shown)
-        ends = ends[left & (self._states(increment) != mechanics.ABSENT)]
-        shares = np.linspace(0.0, 1.0, ALONG)[:, None, None]
-        return ((1.0 - shares) * ends[:, 0] + shares * ends[:, 1]).reshape(-1, self._assembly.dimension)
+        return np.asarray(ends[left & (self._states(increment) != mechanics.ABSENT)])
 
     def strands(self, increment: solver.Increment, shown: solver.Pose, dash: float) -> list[Strands]:
         """List what is drawn of an increment, back to front; in a fall no stubs of what has broken.

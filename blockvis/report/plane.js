@@ -73,30 +73,40 @@
     pen.stroke();
   }
 
-  function hatch() {
+  // Lines across a tile, which rise to the right or fall, on paper or on nothing.
+  function tiled(size, paper, line, rises) {
     const tile = document.createElement("canvas"), pen = tile.getContext("2d");
-    tile.width = tile.height = 9;
-    pen.fillStyle = model.colours.support; pen.fillRect(0, 0, 9, 9);
-    pen.strokeStyle = model.colours.hatch; pen.lineWidth = 0.9;
-    pen.beginPath();
-    for (const x of [-9, 0, 9]) { pen.moveTo(x - 1, 10); pen.lineTo(x + 10, -1); }
-    pen.stroke();
-    return canvas.getContext("2d").createPattern(tile, "repeat");
-  }
-  const support = hatch();
-
-  // Fill lies on pieces of blocks, up to its surface, wherever they are.
-  function tiled([paper, line]) {
-    const tile = document.createElement("canvas"), pen = tile.getContext("2d");
-    tile.width = tile.height = 14;
-    pen.fillStyle = paper; pen.fillRect(0, 0, 14, 14);
+    tile.width = tile.height = size;
+    if (paper) { pen.fillStyle = paper; pen.fillRect(0, 0, size, size); }
     pen.strokeStyle = line; pen.lineWidth = 0.9;
     pen.beginPath();
-    for (const x of [-14, 0, 14]) { pen.moveTo(x - 1, -1); pen.lineTo(x + 15, 15); }
+    for (const x of [-size, 0, size]) { pen.moveTo(x - 1, rises ? size + 1 : -1); pen.lineTo(x + size + 1, rises ? -1 : size + 1); }
     pen.stroke();
     return canvas.getContext("2d").createPattern(tile, "repeat");
   }
-  const hatched = model.fill && tiled(model.fill.colours);
+  const support = tiled(9, model.colours.support, model.colours.hatch, true), earth = tiled(9, null, model.colours.hatch, true);
+
+  // The ground of a fall, and what lies between it and supports that are ground, as they reach below all free blocks.
+  const lowest = new Float64Array(nBlocks).fill(Infinity);
+  for (let b = 0; b < nBlocks; b++) for (let v = offsets[b]; v < offsets[b + 1]; v++) lowest[b] = Math.min(lowest[b], vertices[2 * v + 1]);
+  const lowestFree = lowest.reduce((least, y, b) => (model.roles[b] ? least : Math.min(least, y)), Infinity);
+  function drawGround(pen, w) {
+    const y = model.ground, sides = [[world(0, 0)[0], y, world(w, 0)[0], y]];
+    pen.fillStyle = earth;
+    for (let b = 0; b < nBlocks; b++) {
+      if (!model.roles[b] || lowest[b] >= lowestFree) continue;
+      for (let v = offsets[b], n = offsets[b + 1]; v < n; v++) {
+        const next = v + 1 < n ? v + 1 : offsets[b], [x0, y0, x1, y1] = [corners[2 * v], corners[2 * v + 1], corners[2 * next], corners[2 * next + 1]];
+        if (x1 <= x0 || y0 <= y) continue;
+        if (!(pen instanceof SvgPen)) { ring(pen, [[x0, y0], [x1, y1], [x1, y], [x0, y]]); pen.fill(); }
+        sides.push([x0, y0, x0, y], [x1, y1, x1, y]);
+      }
+    }
+    pen.strokeStyle = model.colours.hatch; pen.lineWidth = 1.5; lineBetween(pen, sides);
+  }
+
+  // Fill lies on pieces of blocks, up to its surface, wherever they are.
+  const hatched = model.fill && tiled(14, ...model.fill.colours.slice(0, 2), false);
   function fillPieces(k) {
     return model.fill.pieces.filter(([b]) => !gone[k].has(b)).map(([b, x0, y0, x1, y1, surface, base, weight, across]) => {
       const p = carried(shown, b, x0, y0), r = carried(shown, b, x1, y1), depth = Math.max(0, surface - Math.max(base, (p[1] + r[1]) / 2));
@@ -157,10 +167,7 @@
   function paint(pen, w, h, colours) {
     const near = Math.min(Math.round(state.frame), nFrames - 1), falling = model.frames[near].falling;
     pen.lineJoin = "round"; pen.lineCap = "butt";
-    if (model.ground !== null) {
-      pen.strokeStyle = model.colours.hatch; pen.lineWidth = 1.5;
-      pen.beginPath(); pen.moveTo(0, py(model.ground)); pen.lineTo(w, py(model.ground)); pen.stroke();
-    }
+    if (model.ground !== null) drawGround(pen, w);
     if (model.fill && !falling) drawFill(pen, near);
     if (layers.start) drawStart(pen, colours);
     state.cracks = 0;

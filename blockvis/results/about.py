@@ -130,10 +130,16 @@ def after_settlements(response: solver.Response) -> str:
     return told and f"after {'settlements' if len(before) > 1 else 'a settlement'} of {told}"
 
 
+def settlement_in(course: Measured, phase: int) -> solver.Settlement | None:
+    """Give the settlement of a phase, by its number from 0, and of what follows the last that one's; None for none."""
+    phases = phases_of(course)
+    return phases[min(phase, len(phases) - 1)] if phases else None
+
+
 def unit_in(course: Measured, phase: int) -> str:
     """Give the unit of the parameter in a phase, by its number from 0: "m" or "rad" of a settlement."""
-    phases = phases_of(course)
-    return phases[min(phase, len(phases) - 1)].unit if phases else course.parameter.unit
+    settlement = settlement_in(course, phase)
+    return course.parameter.unit if settlement is None else settlement.unit
 
 
 @dataclass(frozen=True)
@@ -230,7 +236,7 @@ def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
 
 def losing(response: solver.Response) -> solver.Increment | None:
     """Find the increment from which the collapse mechanism takes blocks; None where a response loses no equilibrium."""
-    lost = response.collapse is not None and response.collapse.lost == "equilibrium"
+    lost = response.collapse is not None and response.collapse.lost != "capacity"
     return with_mechanism(response) if lost else None
 
 

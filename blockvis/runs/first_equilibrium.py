@@ -48,7 +48,7 @@ def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium
     seconds = time.process_time() - started
     if ending is None and first is not None and first.status != solver.Status.FALLING:
         found = f"it stands: first equilibrium found in {seconds:.1f} s"
-        return FirstEquilibrium(True, "; ".join(first.notes) or found)
+        return FirstEquilibrium(True, "; ".join((found, *first.notes)))
     message = "no first equilibrium was found" if ending is None else ending.message
     falling = [] if first is None else mechanics.falling_blocks(assembly, first.velocity).tolist()
     cause = _cause(case, assembly, falling) if seconds < PATIENCE else ""

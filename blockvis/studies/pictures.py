@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -269,6 +269,9 @@ def _draw_shape(axes: Axes, shape: dict[str, np.ndarray], low: np.ndarray, high:
     cuts = shape["offsets"][1:-1]
     ghost = [ring for ring, free in zip(np.split(shape["at_rest"], cuts), shape["free"], strict=True) if free]
     axes.add_collection(PolyCollection(ghost, facecolor="none", edgecolor="#cfcfcf", linewidth=0.5, zorder=1))
+    fill, rims = (list(shape.get(name, ())) for name in ("fill", "fill_rims"))
+    axes.add_collection(PolyCollection(fill, facecolor=palette.hexadecimal(palette.FILL), zorder=0.5))
+    axes.add_collection(LineCollection(rims, color=palette.hexadecimal(palette.FILL_RIM), linewidth=1.2, zorder=0.6))
     # Ground that goes on beyond the picture ends before its edge, with an outline.
     inside = shapely.box(*(low + 0.25 * MARGIN * (high - low)), *(high - 0.25 * MARGIN * (high - low)))
     rings, colours = [], []
@@ -305,11 +308,11 @@ def _parts_inside(ring: np.ndarray, box: shapely.Polygon) -> list[np.ndarray]:
 
 
 def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> Frame:
-    """Frame what all tiles show: the free blocks, the supports as far as ``SUPPORTS`` beyond, and a margin."""
+    """Frame what all tiles show: free blocks and fill, the supports as far as ``SUPPORTS`` beyond, and a margin."""
     inner, outer = [], []
     for shape in shapes:
         free = np.repeat(shape["free"], np.diff(shape["offsets"]))
-        inner += [shape["vertices"][free], shape["at_rest"][free]]
+        inner += [shape["vertices"][free], shape["at_rest"][free], shape.get("fill_rims", np.zeros(0)).reshape(-1, 2)]
         outer += [shape["vertices"][~free]]
     return frame_around(np.concatenate(inner), np.concatenate(outer), MARGIN, SUPPORTS)
 

@@ -18,6 +18,7 @@ from blockvis.cases.build import case_assembly
 from blockvis.dynamics.fall import falls_from, with_mechanism
 from blockvis.kinds.kind import AnalysisRun
 from blockvis.kinds.kinds import KINDS
+from blockvis.pictures.backfill import fill_bodies
 from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
@@ -123,7 +124,7 @@ def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict
         "sliding_joints": len(mechanism.sliding),
     }
     settlement = response.settlements[collapse_phase(response) or 0] if response.settlements else None
-    return found, _shape(number, assembly, state, mechanism, settlement, response.ties)
+    return found, _shape(number, response, state, mechanism, settlement)
 
 
 def _numbers(response: solver.Response) -> dict[str, Any]:
@@ -207,30 +208,32 @@ def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
 
 def _shape(
     number: int,
-    assembly: solver.Assembly,
+    response: solver.Response,
     falling: solver.Increment,
     mechanism: mechanics.Mechanism,
     settlement: solver.Settlement | None,
-    ties: Sequence[solver.Tie],
 ) -> bytes:
-    """Pack the blocks as the mechanism of the run with a number displaces them, for a small picture.
+    """Pack blocks, ties and fill as the mechanism of the run with a number displaces them, for a small picture.
 
     Of blocks in space these are the faces that are seen, as they are seen. The arrows are where supports settle, and
     which way, where there is a settlement.
     """
+    assembly = response.assembly
     free = assembly.free[assembly.block_of_vertex]
     at_rest = mechanics.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
     (factor,) = swing_factors(assembly, falling, SWING, np.ones(1))
     moved = mechanics.swung(falling.pose, falling.velocity * factor)
-    vertices, tied = mechanics.moved_vertices(assembly, moved), mechanics.tie_ends(ties, assembly, moved)
+    vertices, tied = mechanics.moved_vertices(assembly, moved), mechanics.tie_ends(response.ties, assembly, moved)
+    bodies = fill_bodies(response, moved, falling.fallen)
+    rims = bodies.rims()
     if assembly.dimension == 2:
         low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size
         seen: Frame | None = Frame(low, high)
         offsets, block = assembly.offsets, np.arange(assembly.n_blocks)
     else:
         seen = None
-        tied = VIEW.projected(tied.reshape(-1, 3)).reshape(-1, 2, 2)
+        tied, rims = (VIEW.projected(ends.reshape(-1, 3)).reshape(-1, 2, 2) for ends in (tied, rims))
         corners, offsets, block = _seen_faces(assembly, vertices)
         vertices, at_rest = (VIEW.projected(points[corners]) for points in (vertices, at_rest))
     arrows = [np.zeros((0, assembly.dimension))] * 2
@@ -249,6 +252,8 @@ def _shape(
         arrows=np.stack([places, directions], axis=1),
         ties=tied,
         tie_states=falling.ties.states.astype(np.int8),
+        fill=bodies.columns if assembly.dimension == 2 else np.zeros((0, 4, 2)),
+        fill_rims=rims,
     )
     return buffer.getvalue()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from solver.kinematics import motion_size
 from solver.results.increment import Increment, Status
 from solver.results.mechanism import joint_rates, mechanism_of, with_motion
 from solver.results.response import Collapse
-from solver.tolerances import CLOSING_GAP, FARTHEST_FALL
+from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, FARTHEST_FALL
 
 from .controls import Ending
 from .equilibrium_check import EquilibriumChecks
@@ -120,12 +121,19 @@ class Fall:
             # Where blocks stand without the live load, the mechanism is that of the path at its end.
             velocity = beyond.velocity
         velocity = velocity / max(float(motion_size(velocity, model.length).max()), 1e-300)
-        multiplier, reaction = last.measured, None
         # A phase that begins with the fall has no equilibrium.
-        at_last = with_motion(frames[0], velocity)
+        at_last, reaction = with_motion(frames[0], velocity), None
         if not at_once:
-            reaction = multiplier if not model.has_live else multiplier * model.live_force
             at_last = self.reports.increment(last, velocity, last.place.works)
+            reaction = at_last.reaction
+        words, lost, what = str(mechanism_of(model.assembly, at_last)), "capacity", "no capacity is left"
+        if multiplier_beyond is None:
+            lost, what = "equilibrium", f"equilibrium is lost along the control at α = {last.measured:.6g},"
+            # Statics alone may hold what falls: friction is where the motion has left it.
+            with suppress(NotSolved):
+                largest = float(self.checks.nearest(beyond, COMPUTED_GAP)[:, 0].max(initial=0.0)) * model.force
+                words += f"; forces of up to {largest:.4g} N would be in equilibrium beyond, to which no motion leads"
+                lost = "stable equilibrium"
         # A multiplier is interpolated to zero; an equilibrium is lost anywhere in the bracket.
         part = 0.5 if multiplier_beyond is None else last.measured / (last.measured - multiplier_beyond)
         collapse = Collapse(
@@ -134,16 +142,14 @@ class Fall:
             reaction=reaction,
             mechanism=velocity,
             unit=driver.unit,
-            words=str(mechanism_of(model.assembly, at_last)),
-            lost="equilibrium" if multiplier_beyond is None else "capacity",
+            words=words,
+            lost=lost,
         )
         del at_last, last, frames[max(self.n_frames, at_once) :]
         while frames:
             yield frames.pop(0)
         if not model.has_live:
             return Ending(Status.COLLAPSED, str(collapse), collapse)
-        lost = f"equilibrium is lost along the control at α = {multiplier:.6g},"
-        what = lost if multiplier_beyond is None else "no capacity is left"
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 
     def frames(self, place: Place, at_once: bool = False) -> Iterator[Increment]:

@@ -124,16 +124,14 @@ class Path:
             place = self.stepper.unloaded(start, self.number, ties_at, bonds_at)
             self.tried = PathState(self.number, start, place, FIRST_STEP * self.stepper.unit)
             drawn = bonds_at is None
-            if (resting := self._at_rest(place, drawn)) is None:
-                # Joints that the drawing leaves open close.
-                closed = self.fall.relaxed(place, JUMP)
-                if closed is not None:
-                    if self.fall.movements(place, closed).max() > MECHANISM:
-                        self.reports.notes = [(0.0, self.reports.settled(start, closed.pose))]
-                    # Those that have mortar are the ones that are closed then, or a settlement before has left.
-                    bonded = self.stepper.mortar.cast if drawn else self.stepper.mortar.renamed
-                    closed = bonded(closed, self.stepper.contacts(closed.pose))
-                    resting = self._at_rest(replace(closed, contacts=None, velocity=None), drawn)
+            # Joints that the drawing leaves open close.
+            if not (resting := self._at_rest(place, drawn)) and (closed := self.fall.relaxed(place, JUMP)):
+                if self.fall.movements(place, closed).max() > MECHANISM:
+                    self.reports.notes = [(0.0, self.reports.settled(start, closed.pose))]
+                # Those that have mortar are the ones that are closed then, or a settlement before has left.
+                bonded = self.stepper.mortar.cast if drawn else self.stepper.mortar.renamed
+                closed = bonded(closed, self.stepper.contacts(closed.pose))
+                resting = self._at_rest(replace(closed, contacts=None), drawn)
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
@@ -307,8 +305,7 @@ class Path:
         if is_far:
             state = self._continue_from(state, resting)
         check = check if carries else self._check(resting, reaction)
-        resting, peak = replace(resting, works=place.works), max(state.peak, resting.multiplier)
-        self.state = replace(state, history=(resting,), peak=peak)
+        self.state = replace(state, history=(resting,), peak=max(state.peak, resting.multiplier))
         yield self._report(check)
 
     def _report_peak(self, state: PathState) -> Iterator[Increment]:
@@ -356,8 +353,6 @@ class Path:
         for _ in range(MOST_STEPS):
             if state.place.s >= target * (1.0 - 1e-12):
                 return state, Ending(Status.LIMIT_REACHED)
-            if state.refined and state.upper_bound - state.place.s <= self.driver.tolerance * (1.0 + 1e-9):
-                return state, Ending(Status.FALLING)
             last, (state, outcome) = state.place, self._step(state, target)
             self.tried = state
             self.on_step(state)
@@ -399,23 +394,28 @@ class Path:
             of_friction = min(of_friction, 1.0)
         measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
         if measure > REFUSED and length > FIRST_STEP * unit:
-            return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
-        at_rest = self._on_path(state, new, error.moved, refining)
-        if at_rest is None:
-            if not enclosing:
-                return self._go_back(state, new.s), None
-            return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
-        rested, new = at_rest is not new, replace(at_rest, velocity=new.velocity if at_rest is new else place.velocity)
+            return replace(state, step=length / 4.0), None
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
         # What supports took within a long step is nearer to the mean of the forces.
         works = (*works[:2], (works[2] + self._work_on_supports(place, motion)) / 2.0, works[3])
         new = replace(new, s=s, works=tuple(np.add(place.works, (*works, sum(map(abs, works)))).tolist()))
-        history = (new,) if rested else (*state.history[:1], *state.history[1:][-5:], place)
-        state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
+        on_path = self._on_path(state, new, error.moved, refining)
+        if on_path is None and not enclosing:
+            return self._go_back(state, s), None
+        if on_path is None:
+            # What a long step leaves open may hold, and a bound that it found, in the shorter ones that follow.
+            falls = Ending(Status.FALLING) if length <= self.driver.tolerance else None
+            return replace(state, upper_bound=s, step=length / 3.0), falls
+        history = (*state.history[:1], *state.history[1:][-5:], place)
+        if on_path is not new:
+            # Where blocks have come to rest nothing is behind, and they are as fast as before they were.
+            on_path = replace(on_path, velocity=place.velocity)
+            history = (on_path,)
+        state = replace(state, place=on_path, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
             until = s + ENCLOSED * self.driver.tolerance
-            state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
+            state = replace(state, upper_bound=np.inf, refine_until=until)
         return state, None
 
     def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Ending | None]:
@@ -444,7 +444,10 @@ class Path:
         return min(LONGEST_STEP * self.stepper.unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
     def _on_path(self, state: PathState, new: Place, moved: float, refining: bool) -> Place | None:
-        """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
+        """The place of the path at a new one, which is in equilibrium where blocks are fast or a collapse is enclosed.
+
+        That is where blocks that the viscosity retards come to rest nearby; None where they do not.
+        """
         if self.model.has_live and new.multiplier <= 0.0 and new.s > self._onset():
             return None
         # What creeps moves little in a step that is short, and far in several.
@@ -454,13 +457,12 @@ class Path:
         )
         if not (fast or refining):
             return new
-        # What jumps is followed in time, however little viscosity there is.
-        if refining and moved > JUMP:
+        # What jumps farther than supports move is followed in time, however little viscosity there is.
+        if refining and moved > max(JUMP, FAST * (new.s - state.place.s) / self.stepper.unit):
             return None
         # Of a live load that has viscosity in it more than a step may err by.
         if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
             return new
-        # Blocks that the viscosity retards may come to rest nearby.
         return None if refining else self.fall.relaxed(new, JUMP)
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
@@ -470,13 +472,12 @@ class Path:
         places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < bound)]
         while len(places) > 1 and not self.checks.in_equilibrium(places[-1], self.closed_gap):
             # The path may have come here because blocks that the viscosity retards come to rest nearby.
-            resting = self.fall.relaxed(places[-1], JUMP)
-            if resting is not None:
-                places[-1] = replace(resting, works=places[-1].works)
+            if (resting := self.fall.relaxed(places[-1], JUMP)) is not None:
+                places[-1] = resting
                 break
             bound = min(bound, places.pop().s)
         step = (bound - places[-1].s) / 4.0
-        return replace(state, place=places[-1], step=step, upper_bound=bound, refined=False, history=tuple(places[:-1]))
+        return replace(state, place=places[-1], step=step, upper_bound=bound, history=tuple(places[:-1]))
 
     def _supports_locked(self, place: Place) -> bool:
         """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""
@@ -508,9 +509,9 @@ class Path:
         """Continue from the place where blocks came to rest."""
         if self.fall.movements(state.place, resting).max() > JUMP:
             self.reports.notes.append((resting.s, self.reports.jump(state.place.pose, resting.pose)))
-        place = replace(resting, velocity=None, works=state.place.works)
+        place = replace(resting, velocity=None)
         step = FIRST_STEP * self.stepper.unit
-        return replace(state, place=place, step=step, upper_bound=np.inf, refined=False, history=(place,))
+        return replace(state, place=place, step=step, upper_bound=np.inf, history=(place,))
 
     def _remove_fallen(self, state: PathState, end: Place) -> PathState | None:
         """Continue without the blocks that have fallen; None where none have, too many, or the others fall, too."""

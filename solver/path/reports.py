@@ -48,7 +48,7 @@ class Reports:
             equilibrium_residual=float(np.abs(self.unbalanced(check)).max(initial=0.0)) / model.total_load,
             friction_excess=excess / model.total_load,
             carrying_gap=carrying_gap(in_place, check.forces[between]),
-            largest_penetration=max(largest_penetration(in_place), self._overlap(place)),
+            largest_penetration=max(largest_penetration(in_place), self._overlap(place, contacts)),
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(works[4], 1e-12),
         )
@@ -65,14 +65,14 @@ class Reports:
         live, live_size = model.scaled_live(pose)
         return (resultant + model.scaled_load_at(pose) + check.measured * live_size * live)[model.assembly.free]
 
-    def _overlap(self, place: Place) -> float:
-        """Deepest overlap [m] of blocks that no contact point keeps apart; told of each two once."""
-        assembly, left, deepest = self.model.assembly, self.model.fallen, 0.0
-        if self.model.interfaces.elastic:
-            return 0.0
-        found = assembly.shapes.overlaps(moved_vertices(assembly, place.pose), OVERLAP * float(assembly.widths.min()))
-        for a, b, depth in zip(*found, strict=True):
-            if (assembly.free[a] or assembly.free[b]) and not (left[a] or left[b]):
+    def _overlap(self, place: Place, contacts: Contacts) -> float:
+        """Deepest overlap [m] of which contact points do not know, as of drawn ones and elastic joints; told once."""
+        assembly, deepest = self.model.assembly, 0.0
+        least = OVERLAP * float(assembly.widths.min())
+        for a, b, depth in zip(*assembly.shapes.overlaps(moved_vertices(assembly, place.pose), least), strict=True):
+            known = np.isin(contacts.block_a, (a, b)) & np.isin(contacts.block_b, (a, b))
+            deeper = depth + contacts.gaps[known].min(initial=0.0) > least
+            if deeper and assembly.free[[a, b]].any() and not self.model.fallen[[a, b]].any():
                 deepest = max(deepest, float(depth))
                 if (a, b) not in self.overlapping:
                     words = f"'{assembly.names[a]}' and '{assembly.names[b]}' are {depth:.3g} m in each other"
@@ -131,7 +131,8 @@ class Reports:
         """The ending that names the wedged blocks."""
         normal = place.forces[:, 0]
         assert place.contacts is not None
-        return Ending(Status.LOCKED, wedged(self.model.assembly, place.contacts[normal > 0.1 * normal.max()]))
+        words = wedged(self.model.assembly, place.contacts[normal > 0.1 * normal.max()])
+        return Ending(Status.LOCKED, f"{words} at {place.s:.6g} {self.driver.unit}")
 
     def no_step(self, s: float, reason: str) -> Ending:
         """The ending at a step that was not solved, from a parameter s [m or rad]."""

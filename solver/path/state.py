@@ -47,7 +47,6 @@ class PathState:
     place: Place
     step: float  #: [m or rad], length of the next step
     upper_bound: float = np.inf  #: [m or rad]: without equilibrium, while a collapse is enclosed; infinite otherwise
-    refined: bool = False  #: whether the upper bound was found with reduced viscosity
     refine_until: float = -np.inf  #: [m or rad]: up to here the viscosity stays reduced
     history: tuple[Place, ...] = ()  #: places before, oldest first, to go back to from one without equilibrium
     reported: float = -np.inf  #: [m or rad], parameter of the last increment

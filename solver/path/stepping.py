@@ -310,7 +310,7 @@ class Stepper:
             return self.step(place, length, in_time=in_time, viscosity=viscosity, exact=exact, candidates=all_points)
         motion = np.where(free[:, None], self._of_blocks(motion_so_far), place.pose.movement_to(new.pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
-        new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
+        new = self._arrived(place, replace(new, velocity=velocity, works=place.works), points, left, share)
         memory = tolerances.FRICTION_MEMORY if model.has_live else memory
         work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size, memory)
         # The first step has no earlier movement to compare with.
@@ -341,7 +341,7 @@ class Stepper:
             # What creeps by as much each time is out of balance by what programs are solved to.
             creeps = error.moved < tolerances.CLOSING_GAP and abs(error.moved - before) < STEADY * before
             if time == STANDSTILL and (error.moved < STANDING or creeps):
-                return replace(still, velocity=place.velocity, works=place.works)
+                return replace(still, velocity=place.velocity)
             before = error.moved
             if so_far > tolerances.FARTHEST_FALL:
                 break

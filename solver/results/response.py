@@ -44,8 +44,8 @@ class Collapse(Shown):
     words : str
         How it fails: macro-blocks, hinges and sliding joints.
     lost : str
-        What there is at the one end of the bracket and not at the other: "equilibrium", or "capacity" where the
-        multiplier of the live loads comes to zero.
+        What there is at the one end of the bracket and not at the other: "equilibrium", "stable equilibrium" where
+        forces would balance there that no motion leads to, "capacity" where the live loads' multiplier comes to zero.
     """
 
     displacement: float
@@ -58,14 +58,11 @@ class Collapse(Shown):
 
     def __str__(self) -> str:
         """Say where, at which reaction, and how."""
-        low, high = self.bracket
+        (low, high), where = self.bracket, f"collapse at {self.displacement:.6g} {self.unit}"
         if self.reaction is None:
-            return f"collapse at {self.displacement:.6g} {self.unit}, before anything moves, {self.words}"
-        force = "N" if self.unit == "m" else "N·m"
-        return (
-            f"collapse at {self.displacement:.6g} {self.unit} (equilibrium at {low:.6g}, none at {high:.6g}), "
-            f"reaction {self.reaction:.6g} {force}, {self.words}"
-        )
+            return f"{where}, before anything moves, {self.words}"
+        between, force = f"({self.lost} at {low:.6g}, none at {high:.6g})", "N" if self.unit == "m" else "N·m"
+        return f"{where} {between}, reaction {self.reaction:.6g} {force}, {self.words}"
 
 
 @dataclass(frozen=True)

@@ -268,12 +268,18 @@ def test_an_inner_svg_is_placed_and_scaled_by_its_view_box(tmp_path, ratio, low,
 
 
 def test_clones_are_read_where_they_show_their_original(tmp_path):
-    inner = '<defs><rect id="a" width="1" height="2"/><symbol id="s"><rect width="9" height="9"/></symbol></defs>'
-    inner += '<g id="b" transform="translate(10,0)"><use href="#a" x="3" transform="scale(-1,1)"/></g><use href="#s"/>'
-    inner += '<use xmlns:l="http://www.w3.org/1999/xlink" l:href="#b" y="5"/><use href="other.svg#a"/>'
+    inner = '<defs><rect id="a" width="1" height="2"/><mask id="m"/>'
+    inner += '<symbol id="s"><rect width="9" height="3"/></symbol><symbol id="t" viewBox="1 1 9 3">'
+    inner += '<rect x="1" y="1" width="9" height="3"/></symbol></defs>'
+    inner += '<g id="b" transform="translate(10,0)"><use href="#a" x="3" transform="scale(-1,1)"/></g><use href="#m"/>'
+    inner += '<use xmlns:l="http://www.w3.org/1999/xlink" l:href="#b" y="5"/><use href="other.svg#a"/><use/>'
+    inner += '<use href="#s" x="20"/><use href="#t" x="30" y="1" width="18" height="6"/><use href="#t"/>'
     layout = read_layout(saved(tmp_path, inner), unit="m")
-    np.testing.assert_allclose([ring.min(axis=0) for ring in layout.outlines], [[6, -2], [6, -7]])
-    assert any(note.startswith("skipped: 2 <use> (clones; unlink them") for note in layout.notes)
+    lows = [ring.min(axis=0) for ring in layout.outlines]
+    np.testing.assert_allclose(lows, [[6, -2], [6, -7], [20, -3], [30, -7]])
+    np.testing.assert_allclose(np.ptp(layout.outlines[3], axis=0), [18, 6])
+    assert any(note.startswith("skipped: 3 <use> (clones; unlink them") for note in layout.notes)
+    assert any("<svg> 't' was skipped: it has no width, height" in note for note in layout.notes)
 
 
 def test_an_inner_svg_without_size_is_missed_in_a_note(tmp_path):

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -386,12 +387,13 @@ def test_a_note_is_printed_once(case, capsys):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
-def test_a_second_ctrl_c_does_not_break_off_the_ending():
-    """What ends with the process, as the workers of a study, is not told as a traceback."""
+@pytest.mark.parametrize("told", ["cli.INTERRUPTED", "os.kill(os.getpid(), signal.SIGINT)"])
+def test_a_second_ctrl_c_does_not_break_off_the_ending(told):
+    """What ends with the process, as the workers of a study, is no traceback, and neither is one while it is told."""
     ending = (
         "import atexit, os, signal\nfrom blockvis import cli\n"
         "atexit.register(os.kill, os.getpid(), signal.SIGINT)\n"
-        "cli.main = lambda: cli.INTERRUPTED\ncli.entry()\n"
+        f"cli.main = lambda: {told}\ncli.entry()\n"
     )
     done = subprocess.run([sys.executable, "-c", ending], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (cli.INTERRUPTED, "")
@@ -425,3 +427,19 @@ def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_
     words = ["layout", "arch", "-o", str(tmp_path / "arch.json")]
     done = subprocess.run([sys.executable, "-c", stopped, *words], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (130, "blockvis: interrupted\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
+def test_ctrl_c_before_the_command_line_is_loaded_ends_without_a_traceback():
+    stopped = (
+        "import os, signal, sys\n"
+        "class Stop:\n"
+        "    @staticmethod\n"
+        "    def find_spec(name, *_):\n"
+        "        if name == 'blockvis.cli': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Stop)\n"
+        "from blockvis.__main__ import script\n"
+        "script()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", stopped, "--version"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")

@@ -17,11 +17,11 @@ from blockvis import draw_still, lay_backfill, run_case
 WEIGHT = 10.0
 
 
-def lay(assembly: solver.Assembly, over: str, surface: float, coefficient: float = 0.0) -> solver.Backfill:
+def lay(assembly: solver.Assembly, over: str | list[str], surface: float, coefficient: float = 0.0) -> solver.Backfill:
     return lay_backfill(assembly, over, surface, WEIGHT, coefficient)
 
 
-def down(assembly: solver.Assembly, over: str, surface: float) -> np.ndarray:
+def down(assembly: solver.Assembly, over: str | list[str], surface: float) -> np.ndarray:
     """Vertical load of the fill on each block."""
     fill = lay(assembly, over, surface)
     return -fill.load(assembly, solver.Pose.initial(assembly))[:, assembly.dimension - 1]
@@ -156,6 +156,8 @@ def test_fill_over_covered_blocks_is_refused() -> None:
     assembly = solver.Assembly.from_outlines(boxes, names=["below", "above"])
     with pytest.raises(ValueError, match="none of 'below' looks up to the surface"):
         down(assembly, "below", 3.0)
+    with pytest.warns(UserWarning, match="no fill lies on 'below': no free block .* name the topmost blocks"):
+        down(assembly, ["above", "below"], 3.0)
 
 
 def test_a_linear_program_per_increment_has_no_fill() -> None:

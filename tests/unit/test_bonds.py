@@ -271,6 +271,7 @@ def test_stones_far_from_the_origin_have_no_corner_twice(bond, heads):
         ({"joint": 0.06}, "joint is 0.06 m, more than half of a course of 0.075 m"),
         ({"quoins": (3.0, 0.3)}, "quoins are 3 m long, the wall 5.2 m wide; give at most half"),
         ({"openings": [shapely.box(8, 0, 9, 1)]}, r"opening 1 around \(8.5, 0.5\) lies outside its wall"),
+        ({"openings": [WALL]}, "openings and holes leave nothing of the wall; leave them out"),
         ({"openings": [[[0, 0], [1, 1], [1, 0], [0, 1]]]}, "opening 1 is no simple polygon: .*; redraw it"),
     ],
 )

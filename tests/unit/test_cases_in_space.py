@@ -169,14 +169,16 @@ def test_a_small_overlap_that_facing_leaves_is_a_contact_with_a_note(tmp_path):
     (points, faces), low = box((0, 0, 0.995), (1, 1, 2)), box((0, 0, 0), (1, 1, 1))
     # Too steep for a joint of two faces: it touches along an edge, 5 mm too deep.
     steep = np.where(points[:, 2:] < 1, points + np.array([[0.0, 0.0, 0.2]]) * points[:, :1], points)
-    drawn(tmp_path / "a.json", [low, (steep, faces)], ("low", "high"))
+    prop = box((0.9, 0, 1), (1, 1, 1.178))  # 3 mm too deep, beside it
+    drawn(tmp_path / "a.json", [low, (steep, faces), prop], ("low", "high", "prop"))
     text = '[geometry]\nfile = "a.json"\ndimension = 3\n[roles]\nlow = "moving"\n'
-    found = case(text + DOWN, tmp_path)
-    with pytest.warns(UserWarning, match=r"1 pair of blocks overlaps by up to 0.0049\d* m .*, taken as in contact"):
+    found = case(text + DOWN + "limit = 0.01\n", tmp_path)
+    with pytest.warns(UserWarning, match=r"2 pairs of blocks overlap by up to 0.0049\d* m .*, taken as in contact"):
         assembly = assembly_of(found)
     down = solver.Settlement(direction=(0, 0, -1), increment=0.01, limit=0.01)
     with pytest.raises(ValueError, match="overlaps block"):
         solver.settle(assembly, down, friction_coefficient=0.6)
+    assert blockvis.run_case(found, tmp_path / "out", outputs=()).response.path[0].notes == ()
     with pytest.raises(ValueError, match=r"raise overlap_tolerance \(0.001 m\)"):
         assembly_of(case(text.replace("[roles]", "overlap_tolerance = 0.001\n[roles]") + DOWN, tmp_path))
 

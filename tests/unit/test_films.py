@@ -162,6 +162,27 @@ def test_what_a_limit_load_is_without_bears_no_load():
     tails, tips = LiveLoads(limit.response, [state], 3.0).arrows(state, state.pose)
     assert len(tips) == 1
     assert tips[0, 1] == tails[0, 1]
+    # Where hardly any load is left what is out of balance is none, here a thousandth of it on each block.
+    amount = 1e-3 * limit.multiplier * 1000.0
+    forces = state.state.forces.copy()
+    forces[1, 1] += amount
+    rough = replace(state, parameter=1.0, held=replace(state.state, forces=forces))
+    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 2
+    residual = 2.0 * amount / mechanics.total_weight(assembly)
+    rough = replace(rough, certificate=replace(state.certificate, equilibrium_residual=residual))
+    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 1
+
+
+def test_pressure_is_drawn_on_the_face_that_it_meets():
+    """Through the centroid of its block, an arrow ended there, as that of an acceleration does."""
+    outlines = [rectangle(-1.0, -0.5, 3.0, 0.0), rectangle(0.0, 0.0, 1.0, 1.0)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "free"])
+    weight = solver.self_weight(assembly)
+    pressure = weight.with_forces(assembly, solver.surface_forces(assembly, 1000.0, (1.0, 0.0)), "live")
+    for loads, x in ((pressure, 0.0), (weight.with_acceleration(assembly, (1.0, 0.0)), 0.5)):
+        limit = solver.Structure(assembly, friction_coefficient=0.6, loads=loads).limit_load()
+        (tip,) = LiveLoads(limit.response, limit.response.path, 3.0).arrows(limit.response.path[0], limit.state.pose)[1]
+        np.testing.assert_allclose(tip, [x, 0.5], atol=1e-9)
 
 
 @pytest.mark.slow

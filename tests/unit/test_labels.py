@@ -375,6 +375,16 @@ def test_widths_leave_hinges_free_where_there_is_room():
         assert np.any(np.asarray(picture) != (0, 128, 0)), "it is written in any case"
 
 
+def test_no_leader_crosses_an_arrow_where_there_is_room():
+    """The label lay beyond the arrow, where it covers nothing."""
+    place, arrow = np.array([[50.0, 50.0]]), np.array([[[60.0, 20.0], [60.0, 80.0]]])
+    dots = np.array([[x, y] for x in (5.0, 20.0, 35.0, 50.0) for y in (30.0, 50.0, 70.0)])
+    for arrows, crossed in ((arrow, False), (arrow[:0], True)):
+        picture = Image.new("RGB", (200, 100), "green")
+        write_labels(picture, place, ["9 mm"], 10, dots, lines=arrows)
+        assert np.any(np.asarray(picture)[20:80, 60] != (0, 128, 0)) == crossed
+
+
 def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
     marked = []
     found = drawing.marks_of
@@ -394,11 +404,15 @@ def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
     assert (3, 0) not in counts, "three hinges are those of the settlement, not of the collapse"
 
 
-def test_tiles_of_studies_hold_supports_and_their_arrow():
+def test_tiles_of_studies_hold_supports_and_their_arrow_and_fill():
     response = arch_response()
+    crown = int(response.assembly.centroids[:, 1].argmax())
+    piece, level = [response.assembly.outline(crown)[:2]], 1.0 + float(response.assembly.vertices[:, 1].max())
+    fill = solver.Backfill(piece, np.array([crown]), level, 1e4, thickness=np.ones(1))
+    response = replace(response, loads=replace(response.loads, fills=(fill,)))
     last = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
     mechanism = mechanics.mechanism_of(response.assembly, last)
-    with np.load(io.BytesIO(_shape(0, response.assembly, last, mechanism, response.settlements[0], ()))) as stored:
+    with np.load(io.BytesIO(_shape(0, response, last, mechanism, response.settlements[0]))) as stored:
         shape = {name: stored[name] for name in stored.files}
     np.testing.assert_allclose(shape["arrows"][:, 1], [[1.0, 0.0]])
     # Coordinates of a national grid keep their digits, which single precision would round to 0.25 m.
@@ -410,8 +424,9 @@ def test_tiles_of_studies_hold_supports_and_their_arrow():
     assert (support.min(axis=0) < place).all()
     assert (place < support.max(axis=0)).all()
     frame = pictures._frame([shape])
+    assert shape["fill"][:, 2:, 1].tolist() == [[level, level]]
     assert (frame.low < shape["vertices"].min(axis=0)).all()
-    assert (shape["vertices"].max(axis=0) < frame.high).all()
+    assert (np.maximum(shape["vertices"].max(axis=0), level * np.array([0.0, 1.0])) < frame.high).all()
 
 
 def test_labels_lie_apart_and_tell_by_leaders_where_they_belong():

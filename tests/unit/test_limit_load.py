@@ -231,6 +231,14 @@ def test_a_load_on_top_stands_on_the_surface():
     load = solver.load_on_top(assembly, 1.5, (10.0, -1.0))
     expected = solver.point_load(assembly, 0, (10.0, -1.0), point=(1.5, 1.75))
     assert load == pytest.approx(expected)
+    # At its ends it is above the ground beside it, and above a lower block on its left.
+    assert solver.load_on_top(assembly, 2.0) == pytest.approx(
+        solver.point_load(assembly, 0, (0.0, -1.0), point=(2.0, 2.0))
+    )
+    step = [[[-1, 0], [0, 0], [0, 0.5], [-1, 0.5]], [[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]]
+    stepped = solver.Assembly.from_outlines([*step, GROUND], roles=["free", "free", "free", "fixed"])
+    carry = [np.flatnonzero(solver.load_on_top(stepped, x)[:, 1]).tolist() for x in (-1.0, 0.0, 1.0, 2.0)]
+    assert carry == [[0], [1], [1], [2]]
     with pytest.raises(ValueError, match="stands on the support"):
         solver.load_on_top(assembly, 2.5)
     with pytest.raises(ValueError, match="nothing is below"):

@@ -406,6 +406,10 @@ def test_what_has_been_taken_away_shields_nothing_from_a_later_pressure(tmp_path
     ("more", "words"),
     [
         ('[[loads]]\nblocks = "left"\nforce = [5e4, 0]\nphase = 2\n', "loads 1] blocks 'left' matches only what [[re"),
+        (
+            '[[loads]]\nblocks = "right"\npressure = 1e5\ndirection = [1, 0]\n',
+            "loads 1] pressure along [1.0, 0.0] meets none",
+        ),
         ("[[loads]]\npoint = [0.7, 0.5]\nforce = [5e4, 0]\nphase = 2\n", "(0.7, 0.5) m lies in 'left', which [[remo"),
         (
             '[[ties]]\nname = "t"\nstiffness = 1e7\nkind = "bar"\nphase = 2\nfrom = [1, 0.7]\nto = [2, 0.7]\n',

@@ -584,3 +584,21 @@ def test_what_a_limit_load_is_without_is_not_drawn():
     drawer = Drawer(limit.response, Look(forces="none"), SMALL, (state,))
     column, row = drawer.scene.at_pixel(np.array([(0.5, 1.5)]))[0].astype(int) + drawer.sheet.inside[:2]
     assert alike(np.asarray(drawer.picture(state))[row, column], palette.PAPER)
+
+
+def test_supports_stand_on_the_ground_of_a_fall():
+    """One at rest hung in the air where the other had sunk by more than it is thick."""
+    outlines = [rectangle(x, -0.4, x + 1.0, 0.0) for x in (0, 2)] + [rectangle(x, 0.0, x + 1.0, 1.0) for x in (0, 2)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "moving", "free", "free"])
+    pose = solver.Pose.initial(assembly)
+    pose.positions[[1, 3], 1] -= 0.8
+    frame = Frame(np.array([-0.5, -2.0]), np.array([3.5, 2.0]))
+    scene = FlatScene(assembly, frame, (400, 400), np.full((4, 3), 128, dtype=np.uint8))
+    scene.show_ground(-1.0)
+    scene.pose(pose)
+    drawn = (np.asarray(scene.image()) < 240).any(axis=2)
+    # Rows and columns below the one at rest, between both, and what is left below the other.
+    below, between, left = drawn[245:295, 55:145], drawn[205:295, 155:245], drawn[245:295, 255:345]
+    assert below.mean() > 0.05
+    assert not between.any()
+    assert left.all()

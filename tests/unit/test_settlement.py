@@ -261,6 +261,19 @@ def test_bracket_is_as_narrow_as_asked(tolerance):
     assert response.settlement[-1] == low
 
 
+@pytest.mark.slow
+def test_long_steps_towards_a_collapse_are_no_jumps():
+    settlement = solver.Settlement(
+        direction=(1, 0), increment=0.3, limit=1.2, tolerance=1.2e-3, stops=(0.15, 0.3, 0.6, 0.9)
+    )
+    controls = replace(NO_FALL, step_tolerance=6.25e-4)
+    portal = generators.build("portal", {"column_blocks": 8})
+    response = solver.settle(portal, settlement, friction_coefficient=0.6, controls=controls)
+    assert response.collapse.displacement == pytest.approx(1.1133, rel=1e-3)
+    # 3,712 where a step that supports make as long as a jump counted as one, and the path began again from six of them.
+    assert sum(increment.programs for increment in response.increments) < 1500
+
+
 def test_support_that_moves_away_from_what_it_carried_takes_few_steps():
     wall = generators.wall(bricks=4, courses=4, settling=(0.375, 0.625))
     settlement = solver.Settlement(direction=(0.5, -1.0), increment=0.008, limit=0.024)

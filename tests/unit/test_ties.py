@@ -466,7 +466,9 @@ def test_what_a_prop_presses_from_the_ground_alone_is_wedged():
     rising = solver.Settlement((0.0, 1.0), increment=0.01, limit=0.02)
     response = solver.Structure(assembly, friction_coefficient=0.6, ties=[prop]).settle(rising)
     assert response.stop is solver.Status.LOCKED
-    assert response.message.endswith("1 block is wedged ('propped')")
+    words, at = response.message.removesuffix(" m").rsplit(" at ", 1)
+    assert words.endswith("1 block is wedged ('propped')")
+    assert 0.0 < float(at) < 1e-3
 
 
 def test_forces_within_joints_are_shared_alike_beside_a_tie_that_yields():

@@ -77,8 +77,8 @@ COLUMN = '[geometry]\nlayout = "column"\n'
         ("[material]\ndensity = 2.0", "density 2 kg/m³ is lighter than masonry; if it is in t/m³, give 2000 kg/m³"),
         ("[material]\ndensity = 20", "density 20 kg/m³ is lighter than masonry; if it is in kN/m³, give 2039 kg/m³"),
         (
-            "[settlement]\ndirection = [0, -1]\nincrement = 50\nlimit = 100",
-            "increment = 50 m is .* times the size of the median block, .* m: is it in mm\\? 0.05 m",
+            "[settlement]\ndirection = [0, -1]\nincrement = 5\nlimit = 100",
+            "increment = 5 m is .* times the size of the median block, .* m: is it in mm\\? 0.005 m",
         ),
         (
             "[settlement]\nrotation_centre = [800, -1500]\nincrement = 1e-4\nlimit = 1e-3",
@@ -89,6 +89,13 @@ COLUMN = '[geometry]\nlayout = "column"\n'
 def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
     with pytest.warns(UserWarning, match=note):
         assembled(tmp_path, COLUMN + keys)
+
+
+def test_an_increment_of_more_than_the_whole_structure_is_refused(tmp_path):
+    """After 15 s of a run a wall had sunk by 107 mm, in steps of 1 mm, of 10 m."""
+    said = r"increment = 50 m is .* and the whole is 18 m: if it is in mm, give 0\.05, else at most 18$"
+    with pytest.raises(ValueError, match=said):
+        assembled(tmp_path, COLUMN + "[settlement]\ndirection = [0, -1]\nincrement = 50\nlimit = 100")
 
 
 @pytest.mark.parametrize(("centre", "doubted"), [("[0, 900, 0]", False), ("[900, 0, 0]", True)])
