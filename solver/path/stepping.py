@@ -303,7 +303,8 @@ class Stepper:
         resisting, before = self._resistance(place, length, in_time, viscosity)
         where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT
         closed = (where_sliding, EXACT if exact else np.inf)
-        new, points, left, motion_so_far, is_linearised = self._solved(place, points, s, size, loads, resisting, before, closed)
+        solved = self._solved(place, points, s, size, loads, resisting, before, closed)
+        new, points, left, motion_so_far, is_linearised = solved
         movement_size = self._largest(motion_so_far * self._shares)
         all_points = self._with_missed(start, place, new.pose, movement_size)
         if len(all_points) > len(start):
