@@ -86,7 +86,10 @@ class FillBodies:
 
     @property
     def _extent(self) -> float:
-        return float(np.ptp(self.feet.reshape(-1, self.feet.shape[2]), axis=0).max(initial=1e-9))
+        corners = self.feet.reshape(-1, self.feet.shape[2])
+        # Where there is no fill it has none.
+        across = corners.max(axis=0, initial=-np.inf) - corners.min(axis=0, initial=np.inf)
+        return float(across.max(initial=1e-9))
 
 
 def fill_bodies(response: solver.Response, shown: solver.Pose, gone: np.ndarray | None = None) -> FillBodies:
