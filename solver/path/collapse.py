@@ -19,11 +19,10 @@ from .controls import Ending
 from .equilibrium_check import EquilibriumChecks
 from .reports import Reports
 from .state import EquilibriumCheck, Place
-from .stepping import Stepper
+from .stepping import STANDSTILL, Stepper
 
-#: Steps in time, with those that are refused; and refusals of longer ones between steps in which blocks only creep,
-#: after which they are not waited for.
-TIME_STEPS, REFUSALS = 200, 12
+#: Steps in time, with those that are refused.
+TIME_STEPS = 200
 
 #: Movement, in block sizes, that is large against the compliance of the joints: that of the first frame of a fall.
 MECHANISM = 1e-3
@@ -53,7 +52,7 @@ class Fall:
         Yields places, motions in units of the program, the largest acceleration, in g, and speed, in √(block size · g).
         """
         # In units of √(block size / g).
-        place, time, idle, slow, stuck = replace(place, velocity=None), 0.01, 0, False, 0
+        place, time, longest, idle = replace(place, velocity=None), 0.01, STANDSTILL, 0
         for _ in range(TIME_STEPS):
             self.on_step()
             try:
@@ -62,14 +61,13 @@ class Fall:
             except NotSolved as failure:
                 new, moved = None, failure.moved
             if new is None or moved > largest:
-                # What creeps, and is refused longer steps again and again, does not come to rest.
-                stuck += slow
-                if stuck == REFUSALS:
-                    return
                 time *= min(0.5, 0.8 * np.sqrt(largest / max(moved, largest)))
                 continue
-            place, slow = new, moved < SLOW * time
-            stuck = stuck if slow else 0
+            if not error.is_linearised and moved < MECHANISM:
+                # What turns about points that it is pressed on swings past its rest in each linearisation.
+                time = longest = time / 4.0
+                continue
+            place = new
             yield place, motion, error.turn / time**2, moved / time
             # Each is twice as long as the one before, so that forces out of balance would have moved the blocks, unless
             # friction that has yet to follow the normal forces holds them; steps that grow faster carry blocks past
@@ -77,7 +75,7 @@ class Fall:
             idle = idle + 1 if moved < NO_MOVEMENT and self.checks.is_within_friction(new) else 0
             if idle == 12:
                 return
-            time = min(time * (2.0 if moved < largest / 3.0 else 1.0), 1e3)
+            time = min(time * (2.0 if moved < largest / 3.0 else 1.0), longest)
 
     def relaxed(self, place: Place, farthest: float = FARTHEST_FALL) -> Place | None:
         """The equilibrium in which blocks come to rest with the supports fixed; None where they move farther."""

@@ -395,18 +395,23 @@ class Path:
         measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length / 4.0), None
-        if not self._is_on_path(state, new, error.moved, refining):
-            if not enclosing:
-                return self._go_back(state, new.s), None
-            # What a long step leaves open may hold, and a bound that it found, in the shorter ones that follow.
-            falls = Ending(Status.FALLING) if length <= self.driver.tolerance else None
-            return replace(state, upper_bound=new.s, step=length / 3.0), falls
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
         # What supports took within a long step is nearer to the mean of the forces.
         works = (*works[:2], (works[2] + self._work_on_supports(place, motion)) / 2.0, works[3])
         new = replace(new, s=s, works=tuple(np.add(place.works, (*works, sum(map(abs, works)))).tolist()))
+        on_path = self._on_path(state, new, error.moved, refining)
+        if on_path is None and not enclosing:
+            return self._go_back(state, s), None
+        if on_path is None:
+            # What a long step leaves open may hold, and a bound that it found, in the shorter ones that follow.
+            falls = Ending(Status.FALLING) if length <= self.driver.tolerance else None
+            return replace(state, upper_bound=s, step=length / 3.0), falls
         history = (*state.history[:1], *state.history[1:][-5:], place)
-        state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
+        if on_path is not new:
+            # Where blocks have come to rest nothing is behind, and they are as fast as before they were.
+            on_path = replace(on_path, velocity=place.velocity)
+            history = (on_path,)
+        state = replace(state, place=on_path, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
             until = s + ENCLOSED * self.driver.tolerance
@@ -438,24 +443,27 @@ class Path:
         # A step that was cut at its target does not shorten the next.
         return min(LONGEST_STEP * self.stepper.unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
-    def _is_on_path(self, state: PathState, new: Place, moved: float, refining: bool) -> bool:
-        """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
+    def _on_path(self, state: PathState, new: Place, moved: float, refining: bool) -> Place | None:
+        """The place of the path at a new one, which is in equilibrium where blocks are fast or a collapse is enclosed.
+
+        That is where blocks that the viscosity retards come to rest nearby; None where they do not.
+        """
         if self.model.has_live and new.multiplier <= 0.0 and new.s > self._onset():
-            return False
+            return None
         # What creeps moves little in a step that is short, and far in several.
         fast = moved > LONGEST_STEP or any(
             self.fall.movements(place, new).max() > max(FAST * (new.s - place.s) / self.stepper.unit, MECHANISM)
             for place in (state.place, *state.history)
         )
         if not (fast or refining):
-            return True
+            return new
         # What jumps farther than supports move is followed in time, however little viscosity there is.
         if refining and moved > max(JUMP, FAST * (new.s - state.place.s) / self.stepper.unit):
-            return False
+            return None
         # Of a live load that has viscosity in it more than a step may err by.
-        carries = self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance))
-        # Blocks that the viscosity retards may come to rest nearby.
-        return carries or (not refining and self.fall.relaxed(new, JUMP) is not None)
+        if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
+            return new
+        return None if refining else self.fall.relaxed(new, JUMP)
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
         """Go back to the last place in equilibrium from a parameter that has none."""

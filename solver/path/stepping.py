@@ -81,6 +81,7 @@ class StepError:
     turn: float  #: change of the movement against that of the steps before
     moved: float  #: movement of the fastest block
     penetration: float  #: deepest at a contact point that carries
+    is_linearised: bool  #: whether the last linearisation is as exact as is accepted
 
 
 def viscous_weights(model: Model) -> np.ndarray:
@@ -302,7 +303,8 @@ class Stepper:
         resisting, before = self._resistance(place, length, in_time, viscosity)
         where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT
         closed = (where_sliding, EXACT if exact else np.inf)
-        new, points, left, motion_so_far = self._solved(place, points, s, size, loads, resisting, before, closed)
+        solved = self._solved(place, points, s, size, loads, resisting, before, closed)
+        new, points, left, motion_so_far, is_linearised = solved
         movement_size = self._largest(motion_so_far * self._shares)
         all_points = self._with_missed(start, place, new.pose, movement_size)
         if len(all_points) > len(start):
@@ -314,7 +316,8 @@ class Stepper:
         work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size, memory)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
-        return new, motion / model.lengths, StepError(work, turn, movement_size, self._penetration(points, new))
+        penetration = self._penetration(points, new)
+        return new, motion / model.lengths, StepError(work, turn, movement_size, penetration, is_linearised)
 
     def gives(self, place: Place) -> bool:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""
@@ -373,7 +376,7 @@ class Stepper:
         resisting: np.ndarray,
         before: np.ndarray,
         closed: tuple[float, float],
-    ) -> tuple[Place, _StepPoints, JointPoints, np.ndarray]:
+    ) -> tuple[Place, _StepPoints, JointPoints, np.ndarray, bool]:
         """The place at the end of a step, before joints and members have given, and the movement (n_dof,) to it.
 
         Also its contact points with the joints by which it is solved, and these joints after it.
@@ -439,7 +442,7 @@ class Stepper:
             left = points.joints.after(points.moved(trial), joints)
             if not ((left.left == 0.0) & (points.joints.left > 0.0)).any():
                 new = Place(s, pose, contacts, forces, trial, points.followed, multiplier / (live_size or 1.0))
-                return new, points, left, motion_so_far
+                return new, points, left, motion_so_far, residual <= 1.0
             points, guess, number = replace(points, joints=left), None, 0
 
     def _of_blocks(self, motion: np.ndarray) -> np.ndarray:
