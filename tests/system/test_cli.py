@@ -392,6 +392,8 @@ def test_a_second_ctrl_c_does_not_break_off_the_ending(told):
     """What ends with the process, as the workers of a study, is no traceback, and neither is one while it is told."""
     ending = (
         "import atexit, os, signal\nfrom blockvis import cli\n"
+        # In the background of a shell it is ignored.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "atexit.register(os.kill, os.getpid(), signal.SIGINT)\n"
         f"cli.main = lambda: {told}\ncli.entry()\n"
     )
@@ -433,6 +435,7 @@ def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_
 def test_ctrl_c_before_the_command_line_is_loaded_ends_without_a_traceback():
     stopped = (
         "import os, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "class Stop:\n"
         "    @staticmethod\n"
         "    def find_spec(name, *_):\n"
