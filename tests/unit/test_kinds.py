@@ -283,7 +283,7 @@ def test_a_listener_hears_each_step_in_which_blocks_come_to_rest(tmp_path, monke
 
 @pytest.mark.slow
 def test_a_stone_that_creeps_keeps_no_increment():
-    """It leans from one support to another; looked at for rest at each place that the path went back to, it took 80 s."""
+    """It leans from one support to another; looked at for rest wherever the path went back to, it took 80 s."""
     places = [(-3, -0.5, 0, 0), (0.18, -0.5, 3, 0), (-3, 0, -2.5, 1), (2.5, 0, 3, 1), (-3, 1, 3, 1.3)]
     outlines = [rectangle(*place) for place in [*places, (-0.08, 0, 0.26, 0.1)]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "moving", *["free"] * 4])
