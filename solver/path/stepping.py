@@ -379,7 +379,8 @@ class Stepper:
     ) -> tuple[Place, _StepPoints, JointPoints, np.ndarray, bool]:
         """The place at the end of a step, before joints and members have given, and the movement (n_dof,) to it.
 
-        Also its contact points with the joints by which it is solved, and these joints after it.
+        Also its contact points with the joints by which it is solved, these joints after it, and whether the last
+        linearisation is as exact as is accepted.
         """
         model, driver, free, start, joints = self.model, self.driver, self.free, points.start, points.joints
         forces, supports = points.forces, driver.supports(s)

@@ -413,19 +413,22 @@ def test_a_queue_that_ends_a_run_is_heard_as_ctrl_c_is():
     assert (done.returncode, done.stderr) == (cli.INTERRUPTED, "blockvis: interrupted\n")
 
 
-@pytest.mark.parametrize("package", ["numpy", "scipy", "solver.mechanics"])
-def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_path):
-    """Also where a package executes a text just then, after which Python alone would end by the signal."""
-    stopped = (
+def stopped_at(module, how):
+    """Python text after which the import of a module is stopped."""
+    return (
         "import sys\n"
         "class Stop:\n"
         "    @staticmethod\n"
         "    def find_spec(name, *_):\n"
-        f"        if name == {package!r}: exec('raise KeyboardInterrupt')\n"
+        f"        if name == {module!r}: {how}\n"
         "sys.meta_path.insert(0, Stop)\n"
-        "from blockvis.cli import entry\n"
-        "entry()\n"
     )
+
+
+@pytest.mark.parametrize("package", ["numpy", "scipy", "solver.mechanics"])
+def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_path):
+    """Also where a package executes a text just then, after which Python alone would end by the signal."""
+    stopped = stopped_at(package, "exec('raise KeyboardInterrupt')") + "from blockvis.cli import entry\nentry()\n"
     words = ["layout", "arch", "-o", str(tmp_path / "arch.json")]
     done = subprocess.run([sys.executable, "-c", stopped, *words], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (130, "blockvis: interrupted\n")
@@ -433,16 +436,8 @@ def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
 def test_ctrl_c_before_the_command_line_is_loaded_ends_without_a_traceback():
-    stopped = (
-        "import os, signal, sys\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "class Stop:\n"
-        "    @staticmethod\n"
-        "    def find_spec(name, *_):\n"
-        "        if name == 'blockvis.cli': os.kill(os.getpid(), signal.SIGINT)\n"
-        "sys.meta_path.insert(0, Stop)\n"
-        "from blockvis.__main__ import script\n"
-        "script()\n"
-    )
+    stopped = "import os, signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    stopped += stopped_at("blockvis.cli", "os.kill(os.getpid(), signal.SIGINT)")
+    stopped += "from blockvis.__main__ import script\nscript()\n"
     done = subprocess.run([sys.executable, "-c", stopped, "--version"], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
