@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import shapely
+from scipy.spatial import cKDTree
 
 from blockvis.layout.outlines import chords_of, sagitta
 
@@ -174,8 +176,6 @@ def with_shared_corners(
     Outlines (n, 2) or (n, 3), closed or open, have the chords of their curves; in space they are as seen along z. The
     tolerance is as of :func:`blockvis.layout.outlines.chords_of`.
     """
-    import shapely
-
     own = [(k, curve) for k, of_outline in enumerate(curves) for curve in of_outline if not curve.is_line]
     if not own:
         return list(outlines)
@@ -217,8 +217,6 @@ def with_shared_corners(
 
 def _corners(outlines: Sequence[np.ndarray], curves: Sequence[Sequence[Curve]], meets: float) -> np.ndarray:
     """(n, 2) array: the corners of outlines that are none of chords alone, of those that meet the first one."""
-    from scipy.spatial import cKDTree
-
     kept = []
     for outline, of_outline in zip(outlines, curves, strict=True):
         inner = [np.arange(curve.first + 1, curve.first + curve.chords) for curve in of_outline]

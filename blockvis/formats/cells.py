@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
@@ -93,8 +94,6 @@ def _pieces(rings: Sequence[np.ndarray], owner: np.ndarray) -> np.ndarray:
 
     Two corners do: cells with more sides may lie between them, which is no drawing of several blocks.
     """
-    from scipy.sparse import coo_array
-
     cell, start = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]), np.concatenate(list(rings))
     sides = np.sort(np.column_stack([start, np.concatenate([np.roll(ring, -1) for ring in rings])]), axis=1)
     _, side = np.unique(np.column_stack([owner[cell], sides]), axis=0, return_inverse=True)

@@ -17,6 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from shapely.errors import ShapelyError
+from shapely.geometry import shape
 
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
@@ -93,9 +96,6 @@ def _geojson_features(content: Mapping[str, Any]) -> list[Any]:
 
 def _feature(found: Any, number: int) -> Feature | None:
     """Make a feature of a member of GeoJSON; None of one without geometry."""
-    from shapely.errors import ShapelyError
-    from shapely.geometry import shape
-
     whole = isinstance(found, dict) and found.get("type") == "Feature"
     geometry = found.get("geometry") if whole else found
     if geometry is None:
@@ -120,7 +120,6 @@ def read(path: Path, reading: Reading) -> Layout:
 def _read_shapefile(path: Path, reading: Reading) -> Layout:
     require("geo", f"shapefiles ('{path}'; GeoJSON and GeoPackage are read without)")
     import shapefile
-    from shapely.geometry import shape
 
     beside = {entry.suffix.lower(): entry for entry in path.parent.glob(f"{escape(path.stem)}.*")}
     table, projection = beside.get(".dbf"), beside.get(".prj")
@@ -208,8 +207,6 @@ def _layers(base: sqlite3.Connection, path: Path) -> list[_Layer]:
 
 
 def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Feature:
-    import shapely
-
     blob = row.pop(column)
     called = f"geometry {row.get('fid', '?')} of layer '{layer}'"
     if not isinstance(blob, bytes) or blob[:2] != b"GP" or len(blob) < 8:
@@ -224,7 +221,7 @@ def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Fe
     except NotImplementedError:
         remedy = f"ogr2ogr -nlt CONVERT_TO_LINEAR {path.stem}_straight.gpkg {path.name}"
         raise ValueError(f"{called} has arcs or is in space, which is not read; straighten it: {remedy}") from None
-    except (shapely.errors.ShapelyError, ValueError, TypeError) as error:
+    except (ShapelyError, ValueError, TypeError) as error:
         raise ValueError(f"{called} cannot be read ({' '.join(str(error).split())}); export it again") from None
 
 
@@ -331,8 +328,6 @@ def layout_of_features(
 
 
 def _add(geometry: Any, row: dict[str, Any], found: Drawing) -> None:
-    import shapely
-
     kind = geometry.geom_type
     if geometry.is_empty:
         found.skipped["empty geometries"] += 1
@@ -361,8 +356,6 @@ def _add(geometry: Any, row: dict[str, Any], found: Drawing) -> None:
 
 def _points(line: Any) -> np.ndarray:
     """(n, 3) array: the points of a line; where it has no elevations they are 0."""
-    import shapely
-
     points = shapely.get_coordinates(line, include_z=True)
     points[:, 2] = np.nan_to_num(points[:, 2])
     return np.asarray(points)

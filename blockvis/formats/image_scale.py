@@ -1,14 +1,17 @@
-"""Where the pixels of an image lie: by the keys of the case, a world file beside it, or the tags of a GeoTIFF."""
+"""Images opened, and where their pixels lie: by keys of the case, a world file beside it, or tags of a GeoTIFF."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from numbers import Real
 from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
+from PIL import Image, ImageOps, UnidentifiedImageError
 
 from .reading import Reading
 
@@ -37,6 +40,9 @@ class ImageKeys(TypedDict, total=False):
     smallest: float | None
     outline_tolerance: float | None
 
+
+#: More pixels than this are refused before they fill the memory.
+MOST_PIXELS = 60_000_000
 
 #: Tags of GeoTIFF: size of a pixel, tie point, matrix, keys.
 _SIZE, _TIE, _MATRIX, _KEYS = 33550, 33922, 34264, 34735
@@ -71,6 +77,32 @@ class Placement:
     def placed(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: x and y of points in columns and rows, the rows counted down."""
         return points @ self.matrix[:, :2].T + self.matrix[:, 2]
+
+
+def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
+    """Open an image, upright, and read its tags, if it is a TIFF."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            # Of files by name Pillow maps TIFFs into memory, and shears those that lie on their side.
+            content = path.read_bytes()
+            image = Image.open(BytesIO(content))
+        width, height = image.size
+        if width * height > MOST_PIXELS:
+            raise ValueError(
+                f"'{path}' has {width} × {height} pixels, more than {MOST_PIXELS}; scale it down, or cut it"
+            )
+        tags = dict(getattr(image, "tag_v2", {}))
+        # A lossy WebP blurs colours as a JPEG does.
+        form = "JPEG" if image.format == "WEBP" and b"VP8L" not in content else image.format
+        image.load()
+        upright = ImageOps.exif_transpose(image)
+    except (UnidentifiedImageError, Image.DecompressionBombError):
+        raise ValueError(f"'{path}' is no image that can be read, or too large a one; write it as PNG") from None
+    except (OSError, SyntaxError, EOFError, IndexError, TypeError) as error:
+        raise ValueError(f"'{path}' is a damaged image ({error}); write it again as PNG") from None
+    upright.format = form
+    return upright, tags
 
 
 def placement_of(

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import shapely
+from scipy.spatial import cKDTree
 
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
@@ -102,9 +104,6 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     beyond, as an axis or a dimension does, cuts nothing. An outline around lines that do not reach it stays whole.
     Joints may be drawn as pairs of lines: the strips between them are left out as mortar.
     """
-    import shapely
-    from scipy.spatial import cKDTree
-
     found = Faces()
     axes = [line.chain and not matches([line.layer, *line.looks], only) for line in lines]
     found.left_out += [_axis(line) for line, is_axis in zip(lines, axes, strict=True) if is_axis]
@@ -145,8 +144,6 @@ def _cut_outlines(
     outlines: dict[int, np.ndarray], ignored: Set[int], segments: Any, every: Any, size: float, found: Faces
 ) -> tuple[set[int], set[int]]:
     """Cut outlines, by their numbers, along the lines within them; numbers of these lines, and of outlines cut out."""
-    import shapely
-
     cutting, openings = set[int](), set[int]()
     tree = shapely.STRtree(segments)
     areas = shapely.STRtree([shapely.Polygon(ring) for ring in outlines.values()])
@@ -189,8 +186,6 @@ def _cut_notes(found: Faces, n_lines: int, openings: Set[int]) -> list[Note]:
 
 def _without_mortar(found: Faces, reach: float) -> list[Note]:
     """Leave out the strips between pairs of lines, if they are as many as joints are, and say so; else doubt them."""
-    import shapely
-
     every = [(-1, face.ring) for face in found.faces]
     every += [(i, ring) for i, own in found.pieces.items() for ring in own]
     if not every:
@@ -232,8 +227,6 @@ def _crossing_notes(
     lines: Sequence[Line], segments: list[Any], borders: Sequence[set[int]], meets: float
 ) -> list[Note]:
     """Say which layers have lines that run across those of others, as axes, ground lines and leaders, around faces."""
-    import shapely
-
     layers = np.array([line.layer for line in lines])
     main = Counter(layers[k] for border in borders for k in border).most_common(1)
     i, j = shapely.STRtree(segments).query(segments, "crosses")
@@ -274,8 +267,6 @@ def _nothing_closed(left_out: Sequence[LeftOut]) -> str:
     ends = np.array([item.points[k] for item in lines for k in (0, -1)])
     words = f"{counted(len(lines), 'line closes', 'lines close')} nothing ({listed})"
     if len(lines) > 1:
-        from scipy.spatial import cKDTree
-
         # The ends of one line are neighbours in this list; the nearest end of another line is the second or third.
         distance, near = cKDTree(ends).query(ends, k=min(4, len(ends)))
         other = near // 2 != np.arange(len(ends))[:, None] // 2
@@ -288,8 +279,6 @@ def _nothing_closed(left_out: Sequence[LeftOut]) -> str:
 
 def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: float, found: Faces) -> list[np.ndarray]:
     """Let the ends of the first n lines meet what they miss by little, and be corners of every line that they meet."""
-    import shapely
-
     # An end on a curve hangs between it and its chord: the curve gets a corner there.
     curves = {j: off for j, off in enumerate(offs) if off > 0.0}
     flat = _with_corners(flat, n, curves, MEETS * size, MEETS * size)
@@ -326,8 +315,6 @@ def _with_corners(
     drawn: Sequence[np.ndarray], n: int, offs: dict[int, float], meets: float, apart: float
 ) -> list[np.ndarray]:
     """Make the ends of the first n lines corners of the others that they meet, but for those near a corner."""
-    import shapely
-
     lines = [points.copy() for points in drawn]
     ends = np.array([lines[k][e] for k in range(n) for e in (0, -1)])
     near = np.array([shapely.LineString(lines[j]) for j in offs], dtype=object)
@@ -360,8 +347,6 @@ def _is_on_curve(points: np.ndarray, end: np.ndarray, off: float, meets: float) 
 
 def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarray:
     """Make an end a corner of a line between its own ends, but for one near a corner."""
-    import shapely
-
     if np.hypot(*(points - end).T).min() <= apart:
         return points
     along = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
@@ -372,8 +357,6 @@ def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarra
 
 def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float, int]:
     """Find the place on lines to which an end belongs, its distance and the line; corners of a line come first."""
-    import shapely
-
     best, distance, found = end, reach, -1
     for j, line in lines.items():
         corners = np.array(line.coords)
@@ -391,8 +374,6 @@ def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.n
 
 def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[np.ndarray]:
     """Pieces of an outline around inner ones along its border, two or more; empty where the lines do not cut it."""
-    import shapely
-
     border = shapely.set_precision(area.exterior, grid)
     noded = shapely.union_all([border, *segments, *(one.exterior for one in inner)], grid_size=grid)
     faces = list(shapely.polygonize([*shapely.get_parts(noded)]).geoms)
@@ -406,8 +387,6 @@ def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[
 
 def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
     """Whether a line goes into an outline and out of it by more than a distance."""
-    import shapely
-
     into = shapely.intersects(lines, area.buffer(-reach))
     return bool((into & ~shapely.covers(area.buffer(reach), lines)).any())
 
@@ -416,8 +395,6 @@ def _add_faces(
     lines: list[Line], segments: list[Any], outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
 ) -> None:
     """Add the faces between lines that cut no outline, and the lines that enclose nothing."""
-    import shapely
-
     if not lines:
         return
     grid, paths = GRID * size, {line.layer: line.within or (line.layer,) for line in lines}

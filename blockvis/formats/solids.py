@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout, solids_of
@@ -294,8 +295,6 @@ def _stand_along_y(bodies: Sequence[Body], size: float) -> str:
 
 def _standing(bodies: Sequence[Body], axis: int, size: float) -> int:
     """Count the bodies with a face in the lowest level along an axis; 0 if the middle of all is not above them."""
-    import shapely
-
     # The pieces of one mesh share its points.
     corners = [body.points[np.unique(body.faces)] for body in bodies]
     lowest = min(float(points[:, axis].min()) for points in corners)

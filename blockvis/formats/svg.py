@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
+from PIL import ImageColor
 
 from blockvis.layout.block_table import layer_of, layers_of, on_layer, rows_of
 from blockvis.layout.layout import Layout
@@ -415,8 +416,6 @@ def _transform(element: ElementTree.Element) -> str:
 
 def _colour(where: _Context) -> tuple[str, ...]:
     """Give the colour of a shape as #rrggbb, that of its fill or else of its stroke; none where it has none."""
-    from PIL import ImageColor
-
     word = where.painting["fill" if where.fills else "stroke"]
     try:
         return ("#{:02x}{:02x}{:02x}".format(*ImageColor.getrgb(word)[:3]),)
