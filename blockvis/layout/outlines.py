@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from .left_out import LeftOut
+from .linked import equal_rows
 from .notes import CHANGED, UPRIGHT, Note
 from .views import VIEWS, axis_across, upright_note
 
@@ -231,12 +232,7 @@ def outlines_of_cells(
     real = start != end
     start, end, block = start[real], end[real], block[real]
     key = np.stack([block, np.minimum(start, end), np.maximum(start, end)], axis=1)
-    order = np.lexsort(key.T[::-1])
-    ordered = key[order]
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    group = np.cumsum(new) - 1
-    once = np.sort(order[np.bincount(group)[group] == 1])
+    once = np.setdiff1d(np.arange(len(key)), np.concatenate(equal_rows(key)))
     edges: list[list[tuple[int, int]]] = [[] for _ in names]
     for i in once:
         edges[block[i]].append((int(start[i]), int(end[i])))
