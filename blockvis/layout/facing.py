@@ -54,6 +54,10 @@ class _Faces:
     rings: list[np.ndarray]
     areas: np.ndarray
 
+    def off(self, face: int, plane: np.ndarray) -> float:
+        """How far the corner of a face that is farthest from a plane, (4,) array, is from it."""
+        return float(np.abs(self.rings[face] @ plane[:3] - plane[3]).max())
+
 
 def facing_tolerance(
     solids: Sequence[Solid], joint_thickness: float = 0.0, overlap_tolerance: float | None = None
@@ -242,13 +246,8 @@ def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray
     one, other = one[pair], other[pair]
     along = np.abs(np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3])) > -OPPOSITE
     one, other = one[along], other[along]
-    off = [
-        max(
-            float(np.abs(faces.rings[b] @ faces.planes[a, :3] - faces.planes[a, 3]).max()),
-            float(np.abs(faces.rings[a] @ faces.planes[b, :3] - faces.planes[b, 3]).max()),
-        )
-        for a, b in zip(one.tolist(), other.tolist(), strict=True)
-    ]
+    pairs = zip(one.tolist(), other.tolist(), strict=True)
+    off = [max(faces.off(b, faces.planes[a]), faces.off(a, faces.planes[b])) for a, b in pairs]
     flat = np.array(off, dtype=float) <= 2.0 * near
     return one[flat], other[flat]
 
@@ -296,23 +295,19 @@ def _flat_groups(
         if holds_both_sides(group, sides):
             return False
         plane = _common_plane(faces, group, sides)
-        return all(np.abs(faces.rings[k] @ plane[:3] - plane[3]).max() <= near for k in group)
+        return all(faces.off(k, plane) <= near for k in group)
 
     def holds_both_sides(group: list[int], sides: np.ndarray) -> bool:
         # A thin stone whose faces lay in one plane would be none any more.
         blocks = faces.block[group]
         return bool(np.intersect1d(blocks[sides > 0.0], blocks[sides < 0.0]).size)
 
-    def off(pair: tuple[int, int]) -> float:
-        a, b = pair
-        return float(np.abs(faces.rings[b] @ faces.planes[a, :3] - faces.planes[a, 3]).max())
-
     if is_flat(members):
         return [(members, _sides(faces, members))]
     groups: dict[int, list[int]] = {k: [k] for k in members}
     if holds_both_sides(members, _sides(faces, members)):
         # The joints above and below a thin stone are told apart by the faces that are nearest.
-        pairs = sorted(pairs, key=off)
+        pairs = sorted(pairs, key=lambda pair: faces.off(pair[1], faces.planes[pair[0]]))
     else:
         pairs = sorted(pairs, key=lambda pair: -min(faces.areas[pair[0]], faces.areas[pair[1]]))
     for a, b in pairs:
