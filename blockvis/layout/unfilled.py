@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
+from .layout import Layout
 from .outlines import share_in
-
-if TYPE_CHECKING:
-    from .layout import Layout
 
 #: Outlines within another are openings if they cover at most this fraction of it, and lie farther apart than this
 #: fraction of their size: stones on a background lie closer.
