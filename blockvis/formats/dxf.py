@@ -92,20 +92,7 @@ class _Found(Drawing):
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
-    # What ezdxf would print to the terminal is counted in a note.
-    logging.getLogger("ezdxf").setLevel(logging.CRITICAL + 1)
-    try:
-        content = path.read_bytes()
-        if b"SECTION" not in content:
-            raise ValueError(f"it begins with {content[:16]!r}")
-        if content.startswith(BINARY):
-            # recover reads text only.
-            document = ezdxf.readfile(path)
-            audit = document.audit()
-        else:
-            document, audit = recover.readfile(path)
-    except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        raise ValueError(f"it is not a readable DXF file ({error}); save it again as DXF R2000 or later") from None
+    document, audit = _document(path)
     stated, doubts = _unit(document, reading)
     in_metres = metres_per(reading.unit or stated or "m")
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
@@ -142,6 +129,23 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     refuse_open(found, "closed outline in its model space", "a closed polyline", stated)
     found.notes += _skipped(found)
     return found.layout(stated, own=True)
+
+
+def _document(path: Path) -> tuple[Any, Any]:
+    """Read a file with ezdxf, which says beside the document what it repaired."""
+    # What it would print to the terminal is counted in a note.
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL + 1)
+    try:
+        content = path.read_bytes()
+        if b"SECTION" not in content:
+            raise ValueError(f"it begins with {content[:16]!r}")
+        if not content.startswith(BINARY):
+            return recover.readfile(path)
+        # recover reads text only.
+        document = ezdxf.readfile(path)
+        return document, document.audit()
+    except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise ValueError(f"it is not a readable DXF file ({error}); save it again as DXF R2000 or later") from None
 
 
 def _unit(document: Any, reading: Reading) -> tuple[str, list[str]]:
