@@ -285,10 +285,7 @@ class LimitLoadKind(AnalysisKind):
             lines.append(f"after a settlement of{state.parameter:12.6g} {place}{drawn}")
         lines += filter(None, [after_settlements(response)])
         lines += [f"note: {note}" for note in _notes_on_places(response)]
-        if response.collapse is not None:
-            lines.append(response.message)
-        else:
-            lines.append(f"mechanism: {said['mechanism']}")
+        lines.append(response.message if response.collapse is not None else f"mechanism: {said['mechanism']}")
         if (mass := said.get("effective_mass_share")) is not None:
             spectral = f"a spectral acceleration of {said['spectral_acceleration']:.6g} g"
             lines.append(f"effective mass       {mass:12.6g}     of what moves: {spectral}")
@@ -549,8 +546,8 @@ def _over_places(
     assert shown is not None
     yield from _swinging(run.given.assembly, shown)
     ending = _limit_ending(run.limits[chosen])
-    failed = [limit.status is solver.LimitStatus.NOT_CONVERGED for limit in run.limits]
-    note = _unconverged([float(x) for x, lacks in zip(places, failed, strict=False) if lacks], len(places))
+    pairs = zip(places.tolist(), run.limits, strict=False)
+    note = _unconverged([x for x, limit in pairs if limit.status is solver.LimitStatus.NOT_CONVERGED], len(places))
     return replace(ending, message="; ".join(filter(None, (ending.message, note))))
 
 

@@ -117,7 +117,7 @@ class SettlementKind(AnalysisKind):
                 return f"{value:12.6g} N·m"
             return f"{value:12.6g} N   {value / weight:.6f} W"
 
-        lines = [": ".join(told) for told in changes_told(response)]
+        lines = list(map(": ".join, changes_told(response)))
         lines += [f"loss: {note}" for note in losses_of(response)]
         if _method(response) == LINEAR_PROGRAM:
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
