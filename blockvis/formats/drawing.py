@@ -14,7 +14,7 @@ from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, Note
-from blockvis.layout.outlines import drawing_plane, spread_of
+from blockvis.layout.outlines import around_hole, drawing_plane, spread_of
 from solver.mechanics import counted
 
 from .arcs import MEETS, Curve
@@ -104,10 +104,8 @@ class Outline(Stroke):
 
     def left_out(self, called: str) -> LeftOut:
         """Leave it out for its holes."""
-        x, y = self.holes[0].mean(axis=0)
-        message = f"{called} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
-        name, layer = self.row.get("name", ""), self.row.get("group", "")
-        return LeftOut("hole", self.points, message, layer, name, holes=self.holes, looks=self.looks)
+        said = {"name": self.row.get("name", ""), "layer": self.row.get("group", ""), "looks": self.looks}
+        return replace(around_hole(called, self.points, self.holes), **said)
 
 
 @dataclass

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field, replace
+from itertools import chain, compress
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
-from blockvis.layout.outlines import ring_width
+from blockvis.layout.outlines import ends_of, ring_width
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
@@ -105,23 +106,23 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     Joints may be drawn as pairs of lines: the strips between them are left out as mortar.
     """
     found = Faces()
-    axes = [line.chain and not matches([line.layer, *line.looks], only) for line in lines]
-    found.left_out += [_axis(line) for line, is_axis in zip(lines, axes, strict=True) if is_axis]
-    lines = [line for line, is_axis in zip(lines, axes, strict=True) if not is_axis]
+    axes = dict.fromkeys(one for one in lines if one.chain and not matches([one.layer, *one.looks], only))
+    found.left_out += map(_axis, axes)
+    lines = [line for line in lines if line not in axes]
     flat, rings = [line.points for line in lines], [outline.points for outline in outlines]
     if not flat:
         return found
     every = cKDTree(np.concatenate([*flat, *rings]))
     kept = [ring for i, ring in enumerate(rings) if i not in ignored]
     size = float(np.ptp(np.concatenate([*flat, *kept]), axis=0).max())
-    usable = [i for i, ring in enumerate(rings) if float(np.ptp(ring, axis=0).max()) > GRID * size]
-    flat += [np.concatenate([rings[i], rings[i][:1]]) for i in usable]
-    flat = _joined(flat, len(lines), [*(line.off for line in lines), *(outlines[i].off for i in usable)], size, found)
-    segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
+    usable = {i: one for i, one in enumerate(outlines) if float(np.ptp(one.points, axis=0).max()) > GRID * size}
+    flat += [np.concatenate([one.points, one.points[:1]]) for one in usable.values()]
+    flat = _joined(flat, len(lines), [one.off for one in (*lines, *usable.values())], size, found)
+    segments = shapely.set_precision(_lines(flat[: len(lines)]), GRID * size)
     outlined = dict(zip(usable, flat[len(lines) :], strict=True))
     cutting, openings = _cut_outlines(outlined, ignored, segments, every, size, found)
-    rest = [k for k in range(len(lines)) if k not in cutting]
-    _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
+    rest = np.setdiff1d(np.arange(len(lines)), [*cutting])
+    _add_faces([lines[k] for k in rest], segments[rest], kept, every, size, found)
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
     found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
     if found.faces:
@@ -129,6 +130,11 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
         said += f"{counted(len(lines), 'loose line')}; an opening enclosed by lines counts as a block too: "
         found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines"))
     return found
+
+
+def _lines(drawn: Iterable[np.ndarray]) -> np.ndarray:
+    """(n,) array: lines of shapely of these points."""
+    return np.array([shapely.LineString(points) for points in drawn], dtype=object)
 
 
 def _axis(line: Line) -> LeftOut:
@@ -186,52 +192,62 @@ def _cut_notes(found: Faces, n_lines: int, openings: Set[int]) -> list[Note]:
 
 def _without_mortar(found: Faces, reach: float) -> list[Note]:
     """Leave out the strips between pairs of lines, if they are as many as joints are, and say so; else doubt them."""
-    every = [(-1, face.ring) for face in found.faces]
-    every += [(i, ring) for i, own in found.pieces.items() for ring in own]
-    if not every:
-        return []
-    shapes = np.array([shapely.Polygon(ring) for _, ring in every], dtype=object)
-    widths, areas = np.array([ring_width(ring) for _, ring in every]), shapely.area(shapes)
-    order = np.argsort(widths)
-    thin = widths < STRIP * widths[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())]
-    if not thin.any():
-        return []
-    i, j = shapely.STRtree(shapes).query(shapes, "dwithin", reach)
-    beside, borders = shapely.buffer(shapes, reach), shapely.get_exterior_ring(shapes)
-    along = shapely.length(shapely.intersection(borders[i], beside[j])) * (i != j)
-    length, strip = shapely.length(borders), np.zeros(len(every), dtype=bool)
-    # Where strips cross, what they share lies between strips.
-    for _ in range(2):
-        strip = thin & (np.bincount(i, along * (~thin | strip)[j], len(every)) > BETWEEN * length)
+    every = [*(face.ring for face in found.faces), *chain(*found.pieces.values())]
+    strip, across, are_joints = _strips(every, reach)
     if not strip.any():
         return []
-    half = length[strip] / 2.0
-    across = float(np.median(half - np.sqrt(np.maximum(half**2 - 4.0 * areas[strip], 0.0)))) / 2.0
-    x, y = every[int(strip.argmax())][1].mean(axis=0)
+    x, y = every[int(strip.argmax())].mean(axis=0)
     words = f"mortar: {counted(int(strip.sum()), 'strip')} {across:.3g} units wide between larger faces"
-    # Mortar parts the stones; between thin courses of tiles or slabs they touch each other.
-    beside_stones = np.bincount(i, along * ~strip[j], len(every))[~strip]
-    if strip.sum() < max(LEAST_STRIPS, MOSTLY * len(every)) or np.median(beside_stones) > 8.0 * reach:
+    if not are_joints:
         said = "count as blocks; if they are mortar, draw each joint as one line or leave them out (ignore)"
         return [Note(CHANGED, f"{words}, the first around ({x:.6g}, {y:.6g}), {said}")]
-    for k in np.flatnonzero(strip):
-        found.left_out.append(LeftOut("mortar", every[k][1], "the faces between pairs of lines are mortar"))
-    kept = [one for k, one in enumerate(every) if not strip[k]]
-    found.faces = [face for face, is_strip in zip(found.faces, strip, strict=False) if not is_strip]
-    found.pieces = {i: [ring for k, ring in kept if k == i] for i in found.pieces}
+    why = "the faces between pairs of lines are mortar"
+    found.left_out += [LeftOut("mortar", ring, why) for ring in compress(every, strip)]
+    # Faces take the first of these, the pieces of each outline the next.
+    is_stone = iter(~strip)
+    found.faces = [*compress(found.faces, is_stone)]
+    found.pieces = {i: [*compress(own, is_stone)] for i, own in found.pieces.items()}
     said = 'are taken for joints drawn as pairs of lines; joint_thickness = "auto" closes them, only = "*" keeps them'
     return [Note(CHANGED, f"{words} {said} as blocks")]
 
 
+def _strips(rings: Sequence[np.ndarray], reach: float) -> tuple[np.ndarray, float, bool]:
+    """(n,) bool array: which faces are strips between others; their width, and whether they are as many as joints."""
+    none = np.zeros(len(rings), dtype=bool), 0.0, False
+    if not rings:
+        return none
+    shapes = np.array([shapely.Polygon(ring) for ring in rings], dtype=object)
+    widths, areas = np.array([*map(ring_width, rings)]), shapely.area(shapes)
+    order = np.argsort(widths)
+    thin = widths < STRIP * widths[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())]
+    if not thin.any():
+        return none
+    i, j = shapely.STRtree(shapes).query(shapes, "dwithin", reach)
+    beside, borders = shapely.buffer(shapes, reach), shapely.get_exterior_ring(shapes)
+    along = shapely.length(shapely.intersection(borders[i], beside[j])) * (i != j)
+    length, strip = shapely.length(borders), none[0]
+    # Where strips cross, what they share lies between strips.
+    for _ in range(2):
+        strip = thin & (np.bincount(i, along * (~thin | strip)[j], len(rings)) > BETWEEN * length)
+    if not strip.any():
+        return none
+    half = length[strip] / 2.0
+    across = float(np.median(half - np.sqrt(np.maximum(half**2 - 4.0 * areas[strip], 0.0)))) / 2.0
+    # Mortar parts the stones; between thin courses of tiles or slabs they touch each other.
+    beside_stones = np.bincount(i, along * ~strip[j], len(rings))[~strip]
+    many = strip.sum() >= max(LEAST_STRIPS, MOSTLY * len(rings))
+    return strip, across, bool(many and not np.median(beside_stones) > 8.0 * reach)
+
+
 def _crossing_notes(
-    lines: Sequence[Line], segments: list[Any], borders: Sequence[set[int]], meets: float
+    lines: Sequence[Line], segments: np.ndarray, borders: Sequence[set[int]], meets: float
 ) -> list[Note]:
     """Say which layers have lines that run across those of others, as axes, ground lines and leaders, around faces."""
     layers = np.array([line.layer for line in lines])
     main = Counter(layers[k] for border in borders for k in border).most_common(1)
     i, j = shapely.STRtree(segments).query(segments, "crosses")
     i, j = np.array([i, j])[:, (layers[i] != layers[j]) & (layers[i] != (main[0][0] if main else ""))]
-    one, other = np.array(segments, dtype=object)[i], np.array(segments, dtype=object)[j]
+    one, other = segments[i], segments[j]
     # A joint that ends at another may pass it by a little.
     ends = np.array([shapely.get_point(line, k) for line in (one, other) for k in (0, -1)])
     through = (shapely.distance(ends, shapely.intersection(one, other)) > meets).all(axis=0)
@@ -264,7 +280,7 @@ def _nothing_closed(left_out: Sequence[LeftOut]) -> str:
         return ""
     layers = Counter(item.layer for item in lines)
     listed = ", ".join(f"{n} on layer '{layer}'" if layer else f"{n}" for layer, n in layers.most_common(6))
-    ends = np.array([item.points[k] for item in lines for k in (0, -1)])
+    ends = ends_of(item.points for item in lines)
     words = f"{counted(len(lines), 'line closes', 'lines close')} nothing ({listed})"
     if len(lines) > 1:
         # The ends of one line are neighbours in this list; the nearest end of another line is the second or third.
@@ -282,21 +298,18 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
     # An end on a curve hangs between it and its chord: the curve gets a corner there.
     curves = {j: off for j, off in enumerate(offs) if off > 0.0}
     flat = _with_corners(flat, n, curves, MEETS * size, MEETS * size)
-    others = [shapely.LineString(points) for points in flat]
+    others = _lines(flat)
     tree = shapely.STRtree(others)
-    ends = [(k, e) for k in range(n) for e in (0, -1)]
-    which, other = tree.query(shapely.points(np.array([flat[k][e] for k, e in ends])), "intersects")
-    own = np.array([k for k, _ in ends])
-    meeting = set(which[other != own[which]].tolist())
+    which, other = tree.query(shapely.points(ends_of(flat[:n])), "intersects")
+    meeting = which[other != which // 2]
     moved = []
-    for number, (k, e) in enumerate(ends):
-        if number in meeting:
-            continue
+    for number in np.setdiff1d(np.arange(2 * n), meeting).tolist():
+        k, e = number // 2, -(number % 2)
         end = flat[k][e]
         reach = min(MEETS * size, SHORTENED * float(shapely.length(others[k])))
-        near = [int(j) for j in tree.query(shapely.Point(end), "dwithin", MEETS * size) if j != k]
         # A line that has moved is taken where it is now.
-        best, distance, j = _nearest({j: shapely.LineString(flat[j]) for j in near}, end, reach)
+        near = tree.query(shapely.Point(end), "dwithin", MEETS * size).tolist()
+        best, distance, j = _nearest({j: shapely.LineString(flat[j]) for j in near if j != k}, end, reach)
         if distance < reach and distance > 0.0:
             flat[k][e] = best
             # An end of that line may move, too.
@@ -316,8 +329,7 @@ def _with_corners(
 ) -> list[np.ndarray]:
     """Make the ends of the first n lines corners of the others that they meet, but for those near a corner."""
     lines = [points.copy() for points in drawn]
-    ends = np.array([lines[k][e] for k in range(n) for e in (0, -1)])
-    near = np.array([shapely.LineString(lines[j]) for j in offs], dtype=object)
+    ends, near = ends_of(lines[:n]), _lines(lines[j] for j in offs)
     reach = np.array([*offs.values()]) + meets
     which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", reach)
     for j, i in zip(np.array([*offs], dtype=int)[which].tolist(), number.tolist(), strict=True):
@@ -392,7 +404,7 @@ def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
 
 
 def _add_faces(
-    lines: list[Line], segments: list[Any], outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
+    lines: list[Line], segments: np.ndarray, outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
 ) -> None:
     """Add the faces between lines that cut no outline, and the lines that enclose nothing."""
     if not lines:
@@ -401,9 +413,8 @@ def _add_faces(
     faces, cuts, dangles, _ = shapely.polygonize_full([shapely.union_all(segments, grid_size=grid)])
     loose = shapely.union_all([dangles, cuts]).buffer(2 * grid)
     shapely.prepare(loose)
-    for line, segment in zip(lines, segments, strict=True):
-        if shapely.covers(loose, segment):
-            found.left_out.append(line.left_out("open", _open_message(line), f"line {line.handle}"))
+    alone = [lines[k] for k in np.flatnonzero(shapely.covers(loose, segments))]
+    found.left_out += [line.left_out("open", _open_message(line), f"line {line.handle}") for line in alone]
     tree = shapely.STRtree(segments)
     drawn, borders = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines]), list[set[int]]()
     for face in faces.geoms:
@@ -423,9 +434,9 @@ def _add_faces(
             found.left_out.append(LeftOut("hole", ring, message, layer, "face", holes=holes))
             continue
         inner = face.buffer(-10 * grid)
-        over = [drawn.geometries[k] for k in drawn.query(inner, "intersects")]
+        over = drawn.geometries[drawn.query(inner, "intersects")]
         # Within an outline it may be a block in a frame: that is judged when all outlines are there.
-        if over and not all(outline.covers(inner) for outline in over):
+        if not shapely.covers(over, inner).all():
             message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
             found.left_out.append(LeftOut("across", ring, message, layer, "face"))
             continue
