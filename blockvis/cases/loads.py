@@ -11,9 +11,10 @@ import numpy as np
 
 import solver
 from blockvis.layout.names import blocks_matching
+from blockvis.layout.outlines import ROUNDING
 from blockvis.text import force_text
 
-from .block_at import ON_EDGE, block_at, note_outside
+from .block_at import block_at, note_outside
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ def _force_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force:
     """
     parts = assembly.polyhedra.parts
     faces, starts = parts.solids.faces(parts.solids.vertices), parts.solids.faces_of_block[:-1]
-    near = ON_EDGE * assembly.block_size
+    near = ROUNDING * assembly.block_size
     normals, rise = faces.normals, faces.normals[:, 2]
     beyond = ((np.array([x, y]) - faces.middles[:, :2]) * normals[:, :2]).sum(axis=1)
     # A convex part is where the vertical line is behind all of its faces.
