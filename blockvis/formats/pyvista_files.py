@@ -27,13 +27,17 @@ from solver.mechanics import counted
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
 from .cells import flat_beside, layout_of_cells, merged, owners, rows_of_cells
-from .node_order import VTK, VTK_LINES, VTK_OTHER_FACES, ring_of_nodes
+from .node_order import VTK, ring_of_nodes
 from .reading import DEEPEST, Reading, naming
 from .volumes import VTK_SOLIDS, bodies_of_cells
 from .vtk_arrays import announced_bytes, largest_number
 
 #: VTK's type of cell with a volume that lists its faces, which do not follow from the type.
 POLYHEDRON = pyvista.CellType.POLYHEDRON
+
+#: VTK's types of cell with an area, of which some are read, and those with none, which draw no block.
+FACES = tuple(kind for kind in pyvista.CellType if kind.dimension == 2)
+LINES = tuple(kind for kind in pyvista.CellType if kind.dimension < 2)
 
 #: The cell array by which files of an increment say which blocks have left for good.
 GONE = "fallen"
@@ -235,7 +239,7 @@ def found_in_dataset(data: Any, view: str | None) -> Layout | Bodies:
     if solid.any():
         found: Layout | Bodies = _bodies_of_solids(grid, ~gone)
         points_of = np.split(connectivity, offset[1:-1])
-        faces = np.isin(types, [*VTK, *VTK_OTHER_FACES])
+        faces = np.isin(types, FACES)
         flat = [points_of[k] for k in np.flatnonzero(faces & ~gone)]
         notes += flat_beside([points_of[k] for k in np.flatnonzero(solid)], flat)
         notes += _unread(types[~gone & ~solid & ~faces])
@@ -254,7 +258,7 @@ def found_in_dataset(data: Any, view: str | None) -> Layout | Bodies:
 def _unread(types: np.ndarray) -> tuple[str, ...]:
     """Count in a note the cells of types that are not read, but for lines and points, which draw no block."""
     names = {int(kind): kind.name.lower().replace("_", " ") for kind in pyvista.CellType}
-    counts = Counter(names.get(kind, f"type {kind}") for kind in types.tolist() if kind not in VTK_LINES)
+    counts = Counter(names.get(kind, f"type {kind}") for kind in types.tolist() if kind not in LINES)
     if not counts:
         return ()
     listed = ", ".join(f"{n} {kind}" for kind, n in counts.items())
