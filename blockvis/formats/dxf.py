@@ -58,9 +58,6 @@ DEEPEST_INSERT = 16
 #: Layer of AutoCAD that holds the points of dimensions and is never printed.
 NEVER_DRAWN = "Defpoints"
 
-#: An arc of a smaller opening [rad] is a whole ellipse.
-WHOLE_TURN = 1e-9
-
 #: Line types of an entity that stand for that of its layer or of the inserted block.
 BY_LAYER_TYPE, BY_BLOCK_TYPE = "BYLAYER", "BYBLOCK"
 
@@ -396,7 +393,7 @@ def _arc(first: int, centre: Any, radius: float, start: float, sweep: float, tol
 def _ellipse(centre: Sequence[float], axes: np.ndarray, start: float, end: float, tolerance: float | None) -> Stroke:
     """Draw an arc of an ellipse with half axes (d, 2) between two parameters [rad], counter-clockwise."""
     sweep = (end - start) % (2.0 * math.pi)
-    sweep = sweep if sweep > WHOLE_TURN else 2.0 * math.pi
+    sweep = sweep if sweep > ROUNDING else 2.0 * math.pi
     n = chords_of(sweep, float(np.linalg.norm(axes, 2)), tolerance)
     return _along(Arc(0, n, np.array(centre), axes, start, sweep))
 
