@@ -203,16 +203,20 @@ def with_shared_corners(
         t, beside = curve.located(points)
         on = np.flatnonzero((beside <= meets) & (t > 0.0) & (t < 1.0))
         on = on[np.argsort(t[on])]
-        if not len(on):
-            continue
-        parts = list(pairwise([0.0, *t[on].tolist(), 1.0]))
-        chords = [curve.chords_between(a, b, tolerance) for a, b in parts]
-        ends_at = [np.linspace(a, b, m + 1)[1:] for (a, b), m in zip(parts, chords, strict=True)]
-        inner = curve.at(np.concatenate(ends_at)[:-1])
-        inner[np.cumsum(chords)[:-1] - 1, :2] = points[on]
-        before, after = found[k][: curve.first + 1], found[k][curve.first + curve.chords :]
-        found[k] = np.concatenate([before, inner, after])
+        if len(on):
+            before, after = found[k][: curve.first + 1], found[k][curve.first + curve.chords :]
+            found[k] = np.concatenate([before, _through(curve, points[on], t[on], tolerance), after])
     return found
+
+
+def _through(curve: Curve, points: np.ndarray, t: np.ndarray, tolerance: float | None) -> np.ndarray:
+    """(n, d) array: chords of a curve between its ends, through points on it at parameters that rise."""
+    parts = list(pairwise([0.0, *t.tolist(), 1.0]))
+    chords = [curve.chords_between(a, b, tolerance) for a, b in parts]
+    ends_at = [np.linspace(a, b, m + 1)[1:] for (a, b), m in zip(parts, chords, strict=True)]
+    inner = curve.at(np.concatenate(ends_at)[:-1])
+    inner[np.cumsum(chords)[:-1] - 1, :2] = points
+    return inner
 
 
 def _corners(outlines: Sequence[np.ndarray], curves: Sequence[Sequence[Curve]], meets: float) -> np.ndarray:
