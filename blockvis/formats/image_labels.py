@@ -102,15 +102,11 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
     if wanted is not None and wanted not in known:
         raise ValueError(f"it has no background {background!r}; its values are {', '.join(called[:8])}")
     mask = len(known) == 2
-    outer: int | None
     lines = _lines_of_mask(numbers) if mask else None
-    if wanted is not None:
-        outer = known.index(wanted)
-    elif lines is not None:
-        outer = lines
-    elif mask:
+    outer = lines if wanted is None else known.index(wanted)
+    if outer is None and mask:
         outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
-    else:
+    elif outer is None:
         outer = _background(numbers, known, coloured=coloured or not exact)
     if not exact and _is_painted(found, outer):
         raise Photograph
