@@ -11,15 +11,11 @@ import shapely
 import solver
 from solver.mechanics import counted
 
-from .faces import flattened
+from .faces import OFF_PLANE, flattened
 from .linked import linked
 from .outlines import ROUNDING
 from .solids import Solid, area_vectors, planes_of, volume, width_of
 from .surfaces import cleaned, is_closed
-
-#: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
-#: otherwise: drawings of real vaults overlap by up to 8e-4 of a block, and their corners are as far off.
-DEFAULT_FACING = 0.01
 
 #: Faces whose normals are this far from opposite (cosine of 10 degrees) are no joint.
 OPPOSITE = -np.cos(np.radians(10.0))
@@ -66,7 +62,7 @@ def facing_tolerance(
 
     A tolerance below that does not face less: it refuses what is left.
     """
-    default = DEFAULT_FACING * float(np.median([width_of(*solid) for solid in solids]))
+    default = OFF_PLANE * float(np.median([width_of(*solid) for solid in solids]))
     return max(joint_thickness, overlap_tolerance or 0.0, default)
 
 
