@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import solver
+from blockvis.formats.reading import naming
 from blockvis.layout.names import blocks_matching
 from blockvis.layout.outlines import ROUNDING
 from blockvis.text import force_text
@@ -115,11 +116,9 @@ def moving_loads(
             return solver.force_on_top(assembly, x, load.force)
         return _force_on_top_in_space(assembly, x, load.y or 0.0, load.force)
 
-    for x in load.positions:
-        try:
+    with naming(f"{source}: [loads {number}] positions"):
+        for x in load.positions:
             at(x)
-        except ValueError as error:
-            raise ValueError(f"{source}: [loads {number}] positions: {error}") from None
     return np.array(load.positions), lambda k: at(load.positions[k])
 
 

@@ -15,6 +15,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
+from blockvis.formats.reading import naming
 from blockvis.results.about import (
     after_settlements,
     collapse_phase,
@@ -47,8 +48,7 @@ FLOWS = ("associative", "non-associative")
 #: What faces of blocks in space resist when they turn in their own plane.
 TORSIONS = ("points", "uniform")
 
-#: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
-#: structure.
+#: Frames in which the mechanism of a limit load is swung.
 SWINGING_FRAMES = 30
 
 #: Displacement within which joints that a settlement has opened may close, in mean heights of the free blocks, which do
@@ -151,11 +151,9 @@ class LimitLoadKind(AnalysisKind):
             return case
         if not case.settlements or any(load.positions for load in case.loads):
             raise _capacity_at_without_settlement(case)
-        try:
+        with naming(f"{case.source}: [analysis] capacity_at"):
             # Some settlement has to reach each of them.
             replace(max(case.settlements, key=lambda settlement: settlement.limit), stops=settings.capacity_at)
-        except ValueError as error:
-            raise ValueError(f"{case.source}: [analysis] capacity_at: {error}") from None
         reached = [[s for s in settings.capacity_at if s <= phase.limit] for phase in case.settlements]
         stopping = [replace(phase, stops=stops) for phase, stops in zip(case.settlements, reached, strict=True)]
         return replace(case, settlements=tuple(stopping))
@@ -615,7 +613,7 @@ def _limit_state(run: AnalysisRun, loads: solver.Loads, at: Standing, programs: 
 def _limit(run: AnalysisRun, loads: solver.Loads, at: Standing, displacement: float) -> solver.LimitLoad:
     """Find a limit load whose open joints may close within a displacement [m]."""
     case, assembly = run.given.case, run.given.assembly
-    try:
+    with naming(str(case.source)):
         return solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
             pose=at.pose,
             ties_at=at.ties,
@@ -625,8 +623,6 @@ def _limit(run: AnalysisRun, loads: solver.Loads, at: Standing, displacement: fl
             displacement=displacement,
             overlap_tolerance=case.controls.overlap_tolerance,
         )
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None
 
 
 def _displacement(case: Case, assembly: solver.Assembly) -> float:

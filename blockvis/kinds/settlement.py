@@ -13,6 +13,7 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
+from blockvis.formats.reading import naming
 from blockvis.results.about import (
     collapse_phase,
     in_phase,
@@ -292,7 +293,7 @@ def settlement_steps(
     case = given.case
     if not case.settlements:
         return without_increments()
-    try:
+    with naming(str(case.source)):
         return mechanics.settlement_increments(
             given.assembly,
             case.settlements,
@@ -304,8 +305,6 @@ def settlement_steps(
             resume=resume,
             on_step=given.step,
         )
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None
 
 
 def left_by(settlements: Sequence[solver.Settlement]) -> list[str]:
