@@ -164,11 +164,6 @@ class Drawing:
 
         return wanted
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it has nothing but lines that close nothing."""
-        return not self.outlines and all(item.kind == "open" for item in self.left_out)
-
     def layout(self, unit: str, *, unit_by: str = "", own: bool = False, factors: Sequence[float] = (1, 1)) -> Layout:
         """Make a layout of its outlines in the plane, coordinates times factors, with their rows."""
         rows = [one.row for one in self.outlines]
@@ -183,12 +178,6 @@ class Drawing:
             within=tuple(one.within for one in self.outlines),
         )
         return with_rows(layout, rows, own=own) if rows else layout
-
-    def without_lines(self, wants: Callable[[Stroke], bool]) -> list[Line]:
-        """Leave out the lines that are not wanted, as asked for, and the outlines with holes; give the other lines."""
-        self.left_out += [outline.left_out(called) for outline, called in self.holed]
-        self.left_out += [line.left_out("asked line") for line in self.loose if not wants(line)]
-        return [line for line in self.loose if wants(line)]
 
 
 def is_chain(dashes: Sequence[float]) -> bool:

@@ -185,9 +185,8 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
     except (sqlite3.Error, IndexError) as error:
         # Python's error where a table lacks the column that the contents name.
         raise ValueError(f"it is no readable GeoPackage ({error}); export it again") from None
-    named = [layer.name for layer in layers]
-    chosen = [name for name in named if matches([name], reading.only)] or named
-    wanted = [one for one in layers if one.name in chosen and not matches([one.name], reading.ignore)]
+    chosen = [one for one in layers if matches([one.name], reading.only)] or layers
+    wanted = [one for one in chosen if not matches([one.name], reading.ignore)]
     systems = {layer.system: layer for layer in reversed(wanted)}
     if len(systems) > 1:
         listed = ", ".join(f"'{one.name}' in {one.system or 'none'}" for one in reversed(systems.values()))
@@ -316,13 +315,7 @@ def layout_of_features(
     unknown = not (system.unit or system.degrees or system.is_none)
     _check_degrees(found, path, reading, system.degrees, far=unknown and in_plan)
     found.notes += stretched
-    with_faces(
-        found,
-        reading,
-        called=lambda name, k: f"{name} {k + 1}",
-        row_of=lambda layers, name: _row(name, layers[-1], {}),
-        in_place=True,
-    )
+    with_faces(found, reading, row_of=lambda layers, name: _row(name, layers[-1], {}), in_place=True)
     refuse_open(found, "polygon", "one polygon", true)
     found.notes += passed_over(found.skipped)
     return found.layout(true)

@@ -57,28 +57,30 @@ def with_faces(
     drawing: Drawing,
     reading: Reading,
     *,
-    called: Callable[[str, int], str],
     row_of: Callable[[tuple[str, ...], str], dict[str, Any]],
+    called: Callable[[str, int], str] = lambda name, k: f"{name} {k + 1}",
     tolerance: float | None = None,
     in_place: bool = False,
 ) -> None:
     """Let curves share corners, add the faces between lines to a drawing, and cut its outlines along lines in them.
 
     The drawing is in the plane. Lines that are not wanted are left out, and outlines that are not wanted are not cut.
-    ``called`` names a piece by its outline's name and its number, from 0; ``row_of`` writes the row of a face by the
-    layers around most of its lines, and its name. Pieces come ``in_place`` of their outline, or behind the others. The
+    ``row_of`` writes the row of a face by the layers around most of its lines, and its name; ``called`` names a piece
+    by its outline's name and its number, from 0. Pieces come ``in_place`` of their outline, or behind the others. The
     tolerance is as of :func:`blockvis.formats.arcs.with_shared_corners`.
     """
     if not drawing.strokes:
         return
     wants = drawing.wants(reading)
-    lines = drawing.without_lines(wants)
+    drawing.left_out += [outline.left_out(name) for outline, name in drawing.holed]
+    drawing.left_out += [line.left_out("asked line") for line in drawing.loose if not wants(line)]
+    lines = [*filter(wants, drawing.loose)]
     ignored = {k for k, one in enumerate(drawing.outlines) if not wants(one)}
     size = float(np.ptp(np.concatenate([stroke.points for stroke in drawing.strokes]), axis=0).max())
-    drawn, n = [*drawing.outlines, *lines], len(drawing.outlines)
+    drawn: list[Any] = [*drawing.outlines, *lines]
     shared = with_shared_corners([one.points for one in drawn], [one.curves for one in drawn], tolerance)
-    drawing.outlines = [replace(one, points=points) for one, points in zip(drawing.outlines, shared, strict=False)]
-    lines = [replace(line, points=points) for line, points in zip(lines, shared[n:], strict=True)]
+    drawn, n = [replace(one, points=points) for one, points in zip(drawn, shared, strict=True)], len(drawing.outlines)
+    drawing.outlines, lines = drawn[:n], drawn[n:]
     faces = faces_of_lines(lines, drawing.outlines, ignored, reading.only)
     for i, pieces in sorted(faces.pieces.items(), reverse=True):
         whole = drawing.outlines.pop(i)
@@ -265,7 +267,7 @@ def _crossing_notes(
 
 def refuse_open(found: Drawing, what: str, remedy: str, unit: str, factors: Sequence[float] = (1, 1)) -> None:
     """Refuse a drawing that has nothing but lines that close nothing, and say what it has."""
-    if found.is_open:
+    if not found.outlines and all(item.kind == "open" for item in found.left_out):
         skipped = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items() if n)
         notes = [note for note in found.notes if kind_of(note) == LEFT_OUT]
         seen = "; ".join(words for words in (_nothing_closed(found.left_out), skipped, *notes) if words) or "nothing"
@@ -425,13 +427,7 @@ def _add_faces(
         layer = max(sorted(set(nearest)), key=nearest.count)
         ring = _sharpened(ring, every, grid)
         if len(face.interiors):
-            x, y = np.array(face.interiors[0].coords).mean(axis=0)
-            message = (
-                f"the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
-                "or draw the blocks as closed outlines"
-            )
-            holes = tuple(np.array(inner.coords)[:-1] for inner in face.interiors)
-            found.left_out.append(LeftOut("hole", ring, message, layer, "face", holes=holes))
+            found.left_out.append(_with_a_hole(face, ring, layer))
             continue
         inner = face.buffer(-10 * grid)
         over = drawn.geometries[drawn.query(inner, "intersects")]
@@ -444,6 +440,16 @@ def _add_faces(
         found.faces.append(Face(ring, paths[layer], within))
         borders.append({*border})
     found.notes += _crossing_notes(lines, segments, borders, MEETS * size)
+
+
+def _with_a_hole(face: Any, ring: np.ndarray, layer: str) -> LeftOut:
+    x, y = np.array(face.interiors[0].coords).mean(axis=0)
+    message = (
+        f"the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
+        "or draw the blocks as closed outlines"
+    )
+    holes = tuple(np.array(inner.coords)[:-1] for inner in face.interiors)
+    return LeftOut("hole", ring, message, layer, "face", holes=holes)
 
 
 def _open_message(line: Line) -> str:
