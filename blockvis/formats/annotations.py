@@ -167,7 +167,7 @@ def _corners(points: Any) -> np.ndarray:
 
 
 def _ellipse(x: float, y: float, rx: float, ry: float, turn: float = 0.0) -> np.ndarray:
-    n = max(12, round(2.0 * np.pi / LARGEST_CHORD), round(np.pi * np.sqrt(max(rx, ry))))
+    n = max(round(2.0 * np.pi / LARGEST_CHORD), round(np.pi * np.sqrt(max(rx, ry))))
     angle = 2.0 * np.pi * np.arange(n) / n
     c, s = np.cos(turn), np.sin(turn)
     return np.array([x, y]) + np.stack([rx * np.cos(angle), ry * np.sin(angle)], axis=1) @ [[c, s], [-s, c]]
