@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+import solver
 from blockvis.case_files import case_keys
 from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY
@@ -26,9 +27,6 @@ from solver.mechanics import counted
 #: The first increment, and the limit, as fractions of the median block: steps pass over nothing that a block's movement
 #: changes, and most structures have fallen, or shown that they do not, when a support has moved by a block.
 INCREMENT, LIMIT = 0.05, 1.0
-
-#: Friction of dry masonry joints where nothing is known, and a density that most stones and bricks are near.
-FRICTION = 0.6
 
 #: What a new case says of walls without stones.
 WALLS = "The drawing has no stones but outlines with openings: give the size of yours."
@@ -105,7 +103,7 @@ def case_text(
         ),
         _table(
             case_keys.MATERIAL,
-            {"density": None if known else DENSITY, "friction_coefficient": FRICTION},
+            {"density": None if known else DENSITY, "friction_coefficient": solver.InterfaceLaw.friction_coefficient},
             leaving=case_keys.OF_MORTAR,
         ),
     ]

@@ -12,10 +12,9 @@ import shapely
 
 import solver
 from blockvis.layout.names import blocks_matching
-from blockvis.layout.outlines import ring_of
+from blockvis.layout.outlines import ROUNDING, ring_of
 from blockvis.text import listed
 
-from .block_at import ON_EDGE
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
 from .toml_table import Table
 
@@ -133,7 +132,7 @@ def lay_backfill(
         warnings.warn(f"{where} over: {words}; name the topmost blocks", stacklevel=2)
     heights = pieces[:, :, -1].max(axis=1)
     highest = int(heights.argmax())
-    if heights[highest] > surface + ON_EDGE * assembly.block_size:
+    if heights[highest] > surface + ROUNDING * assembly.block_size:
         raise ValueError(
             f"{where} surface is {surface:g} m, below the extrados of block '{assembly.names[block[highest]]}', which "
             f"reaches {heights[highest]:.6g} m; raise it, or leave the block out of over"
@@ -158,7 +157,7 @@ def _extrados(assembly: solver.Assembly, chosen: np.ndarray, surface: float) -> 
     They are (n, d, d) [m]: segments in the plane, triangles in space. What other blocks hide is left out; what stands
     above the surface hides nothing.
     """
-    small = ON_EDGE * assembly.block_size
+    small = ROUNDING * assembly.block_size
     pieces, block = (_segments if assembly.dimension == 2 else _triangles)(assembly, chosen, surface, small)
     d = assembly.dimension
     return np.array(pieces, dtype=float).reshape(-1, d, d), np.array(block, dtype=int)
@@ -208,7 +207,7 @@ def _triangles(
 ) -> tuple[list[np.ndarray], list[int]]:
     shapes, solids = assembly.polyhedra, assembly.polyhedra.parts.solids
     faces = shapes.faces(shapes.vertices)
-    chosen_faces = np.flatnonzero(chosen[shapes.block_of_face] & (faces.normals[:, 2] > ON_EDGE))
+    chosen_faces = np.flatnonzero(chosen[shapes.block_of_face] & (faces.normals[:, 2] > ROUNDING))
     plans = [shapes.vertices[shapes.corners[slice(*shapes.face_offsets[f : f + 2])]] for f in chosen_faces]
     seen = np.array([shapely.Polygon(plan[:, :2]) for plan in plans])
     bodies = [solids.surface(k) for k in range(len(solids))]

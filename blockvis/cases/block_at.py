@@ -10,10 +10,8 @@ import shapely
 from numpy.typing import ArrayLike
 
 import solver
+from blockvis.layout.outlines import ROUNDING
 from blockvis.text import place_text
-
-#: A point on a block's edge or face lies in it, up to this, in block sizes.
-ON_EDGE = 1e-6
 
 
 def distances_to(assembly: solver.Assembly, point: ArrayLike) -> np.ndarray:
@@ -68,13 +66,13 @@ def block_at(
     nearest. ValueError if none of them that is left holds the point; names the nearest and how far it is.
     """
     apart = distances_to(assembly, point)
-    holding = chosen[apart[chosen] <= ON_EDGE * assembly.block_size]
+    holding = chosen[apart[chosen] <= ROUNDING * assembly.block_size]
     place = place_text(point, 6)
     if len(holding) == 0:
         nearest = int(chosen[apart[chosen].argmin()])
         other = int(apart.argmin())
         inside = ""
-        if apart[other] <= ON_EDGE * assembly.block_size:
+        if apart[other] <= ROUNDING * assembly.block_size:
             what = "support" if not assembly.free[other] else "block"
             inside = f"; it lies in the {what} '{assembly.names[other]}', which is not meant"
         raise ValueError(
@@ -94,5 +92,5 @@ def block_at(
         size or 1.0
     )
     near = np.linalg.norm(assembly.centroids[holding] - np.asarray(point), axis=1)
-    into = np.round(distances_to(assembly, ahead)[holding] / (ON_EDGE * assembly.block_size))
+    into = np.round(distances_to(assembly, ahead)[holding] / (ROUNDING * assembly.block_size))
     return int(holding[np.lexsort((*assembly.centroids[holding].T, near, into))[0]])

@@ -15,7 +15,7 @@ from blockvis import generators
 from blockvis.formats.read import overlap_remedy, read_layout, read_outlines
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble, supports_of
-from blockvis.layout.facing import DEFAULT_FACING
+from blockvis.layout.faces import OFF_PLANE
 from blockvis.layout.inspect import DENSITY
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
@@ -206,7 +206,14 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
         if note := steep_note(friction):
             notes.append(f"{where} {note}")
     notes += doubted_numbers(case, assembly)
-    whole, block = float(np.ptp(assembly.vertices, axis=0).max()), float(np.median(sizes)) if len(sizes) else np.inf
+    notes += _doubted_lengths(case, assembly, float(np.median(sizes)) if len(sizes) else np.inf)
+    for note in filter(None, notes):
+        warnings.warn(f"{case.source}: {note}", stacklevel=3)
+
+
+def _doubted_lengths(case: Case, assembly: solver.Assembly, block: float) -> list[str]:
+    """Doubt increments, limits and centres of settlements that are probably in mm, by the size of a block [m]."""
+    notes, whole = [], float(np.ptp(assembly.vertices, axis=0).max())
     farthest = max(FARTHEST_LIMIT * whole, solver.Settlement.limit)
     for key, most, size, what in (
         ("increment", block, block, "size of the median block"),
@@ -231,9 +238,7 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
                 f"[settlement] rotation_centre = {list(centre)} m is {away:.3g} times the size of the structure, "
                 f"{whole:.3g} m, away from it: is it in mm? [{', '.join(f'{1e-3 * x:g}' for x in centre)}] m"
             )
-    for note in notes:
-        if note:
-            warnings.warn(f"{case.source}: {note}", stacklevel=3)
+    return notes
 
 
 def case_controls(case: Case, assembly: solver.Assembly) -> solver.Controls:
@@ -242,7 +247,7 @@ def case_controls(case: Case, assembly: solver.Assembly) -> solver.Controls:
     if not isinstance(shapes, mechanics.Polyhedra) or case.file is None or controls.overlap_tolerance is not None:
         return controls
     width = float(np.median(6.0 * shapes.volumes / shapes.surfaces))
-    return replace(controls, overlap_tolerance=DEFAULT_FACING * width)
+    return replace(controls, overlap_tolerance=OFF_PLANE * width)
 
 
 def _chosen(case: Case) -> dict[str, Any]:

@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 
 import solver
+from blockvis.formats.reading import naming
 from blockvis.layout.names import blocks_matching
+from blockvis.layout.outlines import ROUNDING
 from blockvis.text import force_text
 
-from .block_at import ON_EDGE, block_at, note_outside
+from .block_at import block_at, note_outside
 
 
 @dataclass(frozen=True)
@@ -114,11 +116,9 @@ def moving_loads(
             return solver.force_on_top(assembly, x, load.force)
         return _force_on_top_in_space(assembly, x, load.y or 0.0, load.force)
 
-    for x in load.positions:
-        try:
+    with naming(f"{source}: [loads {number}] positions"):
+        for x in load.positions:
             at(x)
-        except ValueError as error:
-            raise ValueError(f"{source}: [loads {number}] positions: {error}") from None
     return np.array(load.positions), lambda k: at(load.positions[k])
 
 
@@ -130,7 +130,7 @@ def _force_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force:
     """
     parts = assembly.polyhedra.parts
     faces, starts = parts.solids.faces(parts.solids.vertices), parts.solids.faces_of_block[:-1]
-    near = ON_EDGE * assembly.block_size
+    near = ROUNDING * assembly.block_size
     normals, rise = faces.normals, faces.normals[:, 2]
     beyond = ((np.array([x, y]) - faces.middles[:, :2]) * normals[:, :2]).sum(axis=1)
     # A convex part is where the vertical line is behind all of its faces.

@@ -14,11 +14,12 @@ import solver
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, in_words, matches
 from blockvis.layout.names import blocks_called
+from blockvis.layout.outlines import ROUNDING
 from blockvis.text import listed, nearest, place_text
 from solver import mechanics
 from solver.mechanics import counted
 
-from .block_at import ON_EDGE, block_at, distances_to, note_outside
+from .block_at import block_at, distances_to, note_outside
 from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
 from .profiles import STRAIGHT
 from .toml_table import Table, shortened
@@ -330,7 +331,7 @@ def _holding(
         return block
     every = np.arange(assembly.n_blocks)
     apart = distances_to(assembly, point)
-    if apart.min() > ON_EDGE * assembly.block_size:
+    if apart.min() > ROUNDING * assembly.block_size:
         near = assembly.names[int(apart.argmin())]
         fixed = "{ fixed = [" + ", ".join(f"{x:g}" for x in point) + "] }"
         remedy = f"move it there, or hold it by the ground, {fixed}"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
@@ -19,7 +20,7 @@ from blockvis.layout.outlines import LARGEST_CHORD, rectangle
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
-from .image_scale import Placement, placement_of
+from .image_scale import Placement, opened, placement_of
 from .pixels import STAIRS, outlined, regions_of
 from .reading import Reading, naming
 
@@ -114,8 +115,6 @@ def placement_in(path: Path, found: _Annotated, reading: Reading) -> Placement:
     """Find where the pixels of the annotated image lie; the image beside the file is looked at for its size."""
     image = path.parent / Path(found.image.replace("\\", "/")).name if found.image else path
     if found.size is None and image.is_file() and image != path:
-        from .images import opened
-
         found.size = opened(image)[0].size
     if found.size is None:
         # Without a size the lowest of the shapes is at zero.
@@ -168,7 +167,7 @@ def _corners(points: Any) -> np.ndarray:
 
 
 def _ellipse(x: float, y: float, rx: float, ry: float, turn: float = 0.0) -> np.ndarray:
-    n = max(12, round(2.0 * np.pi / LARGEST_CHORD), round(np.pi * np.sqrt(max(rx, ry))))
+    n = max(round(2.0 * np.pi / LARGEST_CHORD), round(np.pi * np.sqrt(max(rx, ry))))
     angle = 2.0 * np.pi * np.arange(n) / n
     c, s = np.cos(turn), np.sin(turn)
     return np.array([x, y]) + np.stack([rx * np.cos(angle), ry * np.sin(angle)], axis=1) @ [[c, s], [-s, c]]
@@ -266,8 +265,6 @@ def _labelme(content: Mapping[str, Any]) -> _Annotated:
 
 def _picture_of(text: str) -> np.ndarray:
     """(height, width) bool array: a mask of LabelMe, written as a picture."""
-    from PIL import Image
-
     try:
         return np.asarray(Image.open(io.BytesIO(base64.b64decode(text))).convert("L")) > 0
     except (OSError, binascii.Error) as error:

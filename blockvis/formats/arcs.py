@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import shapely
+from scipy.spatial import cKDTree
 
 from blockvis.layout.outlines import chords_of, sagitta
 
@@ -174,8 +176,6 @@ def with_shared_corners(
     Outlines (n, 2) or (n, 3), closed or open, have the chords of their curves; in space they are as seen along z. The
     tolerance is as of :func:`blockvis.layout.outlines.chords_of`.
     """
-    import shapely
-
     own = [(k, curve) for k, of_outline in enumerate(curves) for curve in of_outline if not curve.is_line]
     if not own:
         return list(outlines)
@@ -203,22 +203,24 @@ def with_shared_corners(
         t, beside = curve.located(points)
         on = np.flatnonzero((beside <= meets) & (t > 0.0) & (t < 1.0))
         on = on[np.argsort(t[on])]
-        if not len(on):
-            continue
-        parts = list(pairwise([0.0, *t[on].tolist(), 1.0]))
-        chords = [curve.chords_between(a, b, tolerance) for a, b in parts]
-        ends_at = [np.linspace(a, b, m + 1)[1:] for (a, b), m in zip(parts, chords, strict=True)]
-        inner = curve.at(np.concatenate(ends_at)[:-1])
-        inner[np.cumsum(chords)[:-1] - 1, :2] = points[on]
-        before, after = found[k][: curve.first + 1], found[k][curve.first + curve.chords :]
-        found[k] = np.concatenate([before, inner, after])
+        if len(on):
+            before, after = found[k][: curve.first + 1], found[k][curve.first + curve.chords :]
+            found[k] = np.concatenate([before, _through(curve, points[on], t[on], tolerance), after])
     return found
+
+
+def _through(curve: Curve, points: np.ndarray, t: np.ndarray, tolerance: float | None) -> np.ndarray:
+    """(n, d) array: chords of a curve between its ends, through points on it at parameters that rise."""
+    parts = list(pairwise([0.0, *t.tolist(), 1.0]))
+    chords = [curve.chords_between(a, b, tolerance) for a, b in parts]
+    ends_at = [np.linspace(a, b, m + 1)[1:] for (a, b), m in zip(parts, chords, strict=True)]
+    inner = curve.at(np.concatenate(ends_at)[:-1])
+    inner[np.cumsum(chords)[:-1] - 1, :2] = points
+    return inner
 
 
 def _corners(outlines: Sequence[np.ndarray], curves: Sequence[Sequence[Curve]], meets: float) -> np.ndarray:
     """(n, 2) array: the corners of outlines that are none of chords alone, of those that meet the first one."""
-    from scipy.spatial import cKDTree
-
     kept = []
     for outline, of_outline in zip(outlines, curves, strict=True):
         inner = [np.arange(curve.first + 1, curve.first + curve.chords) for curve in of_outline]

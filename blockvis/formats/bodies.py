@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import shapely
 
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.faces import with_plane_faces
@@ -418,8 +419,6 @@ def _hidden(
     axis: int, bodies: Sequence[Body], outlines: Sequence[np.ndarray], low: np.ndarray, high: np.ndarray, size: float
 ) -> str:
     """Say which body lies behind which, or that no plane cuts them all; "" if they are side by side in one leaf."""
-    import shapely
-
     along = "xyz"[axis]
     shapes = shapely.make_valid(shapely.polygons([shapely.linearrings(ring) for ring in outlines]))
     area = shapely.area(shapes)

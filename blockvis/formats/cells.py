@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
@@ -73,7 +74,9 @@ def layout_of_cells(
     if key is not None:
         n, how = len(names), f"one block per value of the cell array '{key}'"
         if key not in OF_BLOCKS:
-            names, owner = _in_pieces(rings, names, owner)
+            pieces, piece = np.unique(np.column_stack([owner, _pieces(rings, owner)]), axis=0, return_inverse=True)
+            # Numbered where a part has several.
+            names, owner = numbered([names[part] for part in pieces[:, 0]]), piece.ravel()
             how = f"one block per connected piece of a value of the cell array '{key}'" if len(names) > n else how
     else:
         whole = any(len(ring) > 3 for ring in rings)
@@ -93,8 +96,6 @@ def _pieces(rings: Sequence[np.ndarray], owner: np.ndarray) -> np.ndarray:
 
     Two corners do: cells with more sides may lie between them, which is no drawing of several blocks.
     """
-    from scipy.sparse import coo_array
-
     cell, start = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]), np.concatenate(list(rings))
     sides = np.sort(np.column_stack([start, np.concatenate([np.roll(ring, -1) for ring in rings])]), axis=1)
     _, side = np.unique(np.column_stack([owner[cell], sides]), axis=0, return_inverse=True)
@@ -105,13 +106,6 @@ def _pieces(rings: Sequence[np.ndarray], owner: np.ndarray) -> np.ndarray:
     shared = coo_array((np.ones(at.shape[1]), at)).tocsr()
     one, other = (shared @ shared.T > 1.0).nonzero()
     return linked(one, other, int(piece.max()) + 1)[piece]
-
-
-def _in_pieces(rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndarray) -> tuple[list[str], np.ndarray]:
-    """Names of the connected pieces of parts, numbered where a part has several, and that of each cell."""
-    pairs = np.column_stack([owner, _pieces(rings, owner)])
-    pieces, piece = np.unique(pairs, axis=0, return_inverse=True)
-    return numbered([names[part] for part in pieces[:, 0]]), piece.ravel()
 
 
 def _enclosed(points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray]) -> Bodies:
@@ -163,9 +157,8 @@ def _row(data: Mapping[str, np.ndarray], cell: int) -> dict[str, Any]:
             word = mechanics.ROLES[int(value)] if float(value) in (0.0, 1.0, 2.0) else f"{value:g}"
         else:
             continue
-        field = "role" if key == "role_name" else key
         if word:
-            row.setdefault(field, word) if field == "role" else row.update({field: word})
+            row.setdefault("role" if key == "role_name" else key, word)
     for key in TABLE_ARRAYS[5:]:
         if key in data and len(data[key]) > cell and np.ndim(data[key][cell]) == 0:
             row[key] = float(data[key][cell])
@@ -287,7 +280,12 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]]) -> Layout:
 
 
 def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path]) -> Layout | Bodies:
-    """Join what several files hold; the block of a file that holds one is named after it."""
+    """Join what several files hold; the block of a file that holds one is named after it.
+
+    Layouts in space are no files of one stone each: they hold all blocks.
+    """
+    if any(isinstance(part, Layout) and part.dimension == 3 for part in found):
+        raise ValueError("it stands for layouts of blocks in space; give one of them")
     units = {part.unit: file for part, file in zip(found, files, strict=True)}
     if len(units) > 1:
         listed = ", ".join(f"'{file.name}' {unit or 'none'}" for unit, file in units.items())

@@ -14,7 +14,7 @@ from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, Note
-from blockvis.layout.outlines import drawing_plane, spread_of
+from blockvis.layout.outlines import around_hole, drawing_plane, spread_of
 from solver.mechanics import counted
 
 from .arcs import MEETS, Curve
@@ -104,10 +104,8 @@ class Outline(Stroke):
 
     def left_out(self, called: str) -> LeftOut:
         """Leave it out for its holes."""
-        x, y = self.holes[0].mean(axis=0)
-        message = f"{called} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
-        name, layer = self.row.get("name", ""), self.row.get("group", "")
-        return LeftOut("hole", self.points, message, layer, name, holes=self.holes, looks=self.looks)
+        said = {"name": self.row.get("name", ""), "layer": self.row.get("group", ""), "looks": self.looks}
+        return replace(around_hole(called, self.points, self.holes), **said)
 
 
 @dataclass
@@ -166,11 +164,6 @@ class Drawing:
 
         return wanted
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it has nothing but lines that close nothing."""
-        return not self.outlines and all(item.kind == "open" for item in self.left_out)
-
     def layout(self, unit: str, *, unit_by: str = "", own: bool = False, factors: Sequence[float] = (1, 1)) -> Layout:
         """Make a layout of its outlines in the plane, coordinates times factors, with their rows."""
         rows = [one.row for one in self.outlines]
@@ -185,12 +178,6 @@ class Drawing:
             within=tuple(one.within for one in self.outlines),
         )
         return with_rows(layout, rows, own=own) if rows else layout
-
-    def without_lines(self, wants: Callable[[Stroke], bool]) -> list[Line]:
-        """Leave out the lines that are not wanted, as asked for, and the outlines with holes; give the other lines."""
-        self.left_out += [outline.left_out(called) for outline, called in self.holed]
-        self.left_out += [line.left_out("asked line") for line in self.loose if not wants(line)]
-        return [line for line in self.loose if wants(line)]
 
 
 def is_chain(dashes: Sequence[float]) -> bool:

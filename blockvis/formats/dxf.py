@@ -12,7 +12,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import numpy as np
+from ezdxf import recover, transform
+from ezdxf.colors import BYBLOCK, BYLAYER, DXF_DEFAULT_COLORS, WHITE, int2rgb
+from ezdxf.math import BSpline, bulge_to_arc, fit_points_to_cad_cv
+from ezdxf.path import Path as Drawn
+from ezdxf.path import add_spline, make_path
+from scipy import interpolate
 
 from blockvis.layout.block_table import layer_of, on_layer, rows_of
 from blockvis.layout.choice import look_of
@@ -51,13 +58,7 @@ DEEPEST_INSERT = 16
 #: Layer of AutoCAD that holds the points of dimensions and is never printed.
 NEVER_DRAWN = "Defpoints"
 
-#: An arc of a smaller opening [rad] is a whole ellipse.
-WHOLE_TURN = 1e-9
-
-#: Colours of an entity that stand for that of its layer or of the inserted block, and what nobody gave a colour.
-BY_LAYER, BY_BLOCK, WHITE = 256, 0, 7
-
-#: The same of line types.
+#: Line types of an entity that stand for that of its layer or of the inserted block.
 BY_LAYER_TYPE, BY_BLOCK_TYPE = "BYLAYER", "BYBLOCK"
 
 _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE", "SOLID", "TRACE", "3DFACE"}
@@ -88,23 +89,7 @@ class _Found(Drawing):
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
-    import ezdxf
-    from ezdxf import recover
-
-    # What ezdxf would print to the terminal is counted in a note.
-    logging.getLogger("ezdxf").setLevel(logging.CRITICAL + 1)
-    try:
-        content = path.read_bytes()
-        if b"SECTION" not in content:
-            raise ValueError(f"it begins with {content[:16]!r}")
-        if content.startswith(BINARY):
-            # recover reads text only.
-            document = ezdxf.readfile(path)
-            audit = document.audit()
-        else:
-            document, audit = recover.readfile(path)
-    except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        raise ValueError(f"it is not a readable DXF file ({error}); save it again as DXF R2000 or later") from None
+    document, audit = _document(path)
     stated, doubts = _unit(document, reading)
     in_metres = metres_per(reading.unit or stated or "m")
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
@@ -141,6 +126,23 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     refuse_open(found, "closed outline in its model space", "a closed polyline", stated)
     found.notes += _skipped(found)
     return found.layout(stated, own=True)
+
+
+def _document(path: Path) -> tuple[Any, Any]:
+    """Read a file with ezdxf, which says beside the document what it repaired."""
+    # What it would print to the terminal is counted in a note.
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL + 1)
+    try:
+        content = path.read_bytes()
+        if b"SECTION" not in content:
+            raise ValueError(f"it begins with {content[:16]!r}")
+        if not content.startswith(BINARY):
+            return recover.readfile(path)
+        # recover reads text only.
+        document = ezdxf.readfile(path)
+        return document, document.audit()
+    except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise ValueError(f"it is not a readable DXF file ({error}); save it again as DXF R2000 or later") from None
 
 
 def _unit(document: Any, reading: Reading) -> tuple[str, list[str]]:
@@ -203,8 +205,6 @@ class _Place:
 
         What a block draws on layer 0 lies on the layer on which it is inserted.
         """
-        from ezdxf import transform
-
         if self.matrix is None:
             return [entity]
         # References are followed by their matrices, which can be sheared.
@@ -214,7 +214,7 @@ class _Place:
         for one in found:
             if one.dxf.layer == "0":
                 one.dxf.layer = self.layer
-            if one.dxf.get("color", BY_LAYER) == BY_BLOCK:
+            if one.dxf.get("color", BYLAYER) == BYBLOCK:
                 one.dxf.color = self.colour
             if str(one.dxf.get("linetype", BY_LAYER_TYPE)).upper() == BY_BLOCK_TYPE:
                 one.dxf.linetype = self.line_type
@@ -250,7 +250,7 @@ def _places(insert: Any, handle: str, where: _Place) -> Iterator[_Place]:
     """Yield the places where a reference inserts its block: one, or those in rows and columns."""
     # QCAD writes a zscale of 0 for plane drawings, with which no transformation can be made.
     insert.dxf.zscale = insert.dxf.get("zscale", 1.0) or 1.0
-    block, layer, colour = str(insert.dxf.get("name", "?")), insert.dxf.layer, int(insert.dxf.get("color", BY_LAYER))
+    block, layer, colour = str(insert.dxf.get("name", "?")), insert.dxf.layer, int(insert.dxf.get("color", BYLAYER))
     for k, copy in enumerate(insert.multi_insert() if insert.mcount > 1 else [insert]):
         with _resolving(block):
             matrix = copy.matrix44() if where.matrix is None else copy.matrix44() * where.matrix
@@ -290,8 +290,6 @@ def _add(entity: Any, handle: str, found: _Found, tolerance: float | None) -> No
 
 
 def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
-    from ezdxf.path import make_path
-
     kind = entity.dxftype()
     if kind in ("SOLID", "TRACE", "3DFACE"):
         found.add(entity, handle, Stroke(points=np.array([(p.x, p.y, p.z) for p in entity.wcs_vertices()])))
@@ -327,8 +325,6 @@ def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, A
 
     ezdxf splits others, as periodic ones, wrongly.
     """
-    from scipy.interpolate import BSpline, make_interp_spline
-
     n, every = len(points), np.array(knots, dtype=float)
     if n <= degree or len(every) != n + degree + 1 or (np.diff(every) < 0).any():
         return points, weights, knots
@@ -338,11 +334,11 @@ def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, A
     if (every[0] == first and every[-1] == last) or first == last or most > degree:
         return points, weights, knots
     factors = np.array(weights if len(weights) == n else np.ones(n))[:, None]
-    curve = BSpline(every, np.column_stack([np.array([(*p,) for p in points]) * factors, factors]), degree)
+    curve = interpolate.BSpline(every, np.column_stack([np.array([(*p,) for p in points]) * factors, factors]), degree)
     ends = np.concatenate([np.full(degree + 1, first), inner, np.full(degree + 1, last)])
     # As many values as there are control points between these knots determine them.
     at = np.array([ends[i + 1 : i + 1 + degree].mean() for i in range(len(ends) - degree - 1)])
-    found = make_interp_spline(at, curve(at), degree, ends).c
+    found = interpolate.make_interp_spline(at, curve(at), degree, ends).c
     return (found[:, :-1] / found[:, -1:]).tolist(), found[:, -1].tolist() if len(weights) else [], ends.tolist()
 
 
@@ -397,7 +393,7 @@ def _arc(first: int, centre: Any, radius: float, start: float, sweep: float, tol
 def _ellipse(centre: Sequence[float], axes: np.ndarray, start: float, end: float, tolerance: float | None) -> Stroke:
     """Draw an arc of an ellipse with half axes (d, 2) between two parameters [rad], counter-clockwise."""
     sweep = (end - start) % (2.0 * math.pi)
-    sweep = sweep if sweep > WHOLE_TURN else 2.0 * math.pi
+    sweep = sweep if sweep > ROUNDING else 2.0 * math.pi
     n = chords_of(sweep, float(np.linalg.norm(axes, 2)), tolerance)
     return _along(Arc(0, n, np.array(centre), axes, start, sweep))
 
@@ -408,8 +404,6 @@ def _along(arc: Arc) -> Stroke:
 
 def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None) -> Stroke:
     """Draw a polyline, (n, 2) points; a closed one ends where it starts."""
-    from ezdxf.math import bulge_to_arc
-
     points, arcs = [np.array(corner[:2]) for corner in corners[:1]], list[Arc]()
     following = [*corners[1:], *(corners[:1] if closed else [])]
     for (x, y, bulge), (u, v, _) in zip(corners, following, strict=False):
@@ -425,16 +419,14 @@ def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolera
 
 def _looks(entity: Any) -> tuple[str, ...]:
     """Kind of an entity and its colour: as #rrggbb and, where it has one, its number."""
-    from ezdxf.colors import DXF_DEFAULT_COLORS, int2rgb
-
-    kind, number = look_of(entity.dxftype()), int(entity.dxf.get("color", BY_LAYER))
+    kind, number = look_of(entity.dxftype()), int(entity.dxf.get("color", BYLAYER))
     exact = entity.dxf.get("true_color")
-    if exact is None and number == BY_LAYER and entity.doc is not None and entity.dxf.layer in entity.doc.layers:
+    if exact is None and number == BYLAYER and entity.doc is not None and entity.dxf.layer in entity.doc.layers:
         drawn = entity.doc.layers.get(entity.dxf.layer)
         number, exact = abs(int(drawn.dxf.get("color", WHITE))), drawn.dxf.get("true_color")
     if exact is not None:
         return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(int(exact))))
-    number = number if 0 < number < BY_LAYER else WHITE
+    number = number if 0 < number < BYLAYER else WHITE
     return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(DXF_DEFAULT_COLORS[number])), str(number))
 
 
@@ -481,10 +473,6 @@ def _then(one: Stroke, other: Stroke, near: float) -> Stroke:
 
 def _edge(edge: Any, tolerance: float | None) -> Stroke:
     """Read one edge of a hatch boundary, in the plane of the hatch."""
-    from ezdxf.math import BSpline, fit_points_to_cad_cv
-    from ezdxf.path import Path as Drawn
-    from ezdxf.path import add_spline
-
     kind = edge.EDGE_TYPE
     if kind == "LineEdge":
         return Stroke(points=np.array([(*edge.start,), (*edge.end,)])[:, :2])
@@ -571,8 +559,6 @@ def _layer_name(row: Mapping[str, Any]) -> str:
 
 def write(layout: Layout, path: Path) -> None:
     """Write .dxf R2000 in m: a closed LWPOLYLINE per block on the layer of its group, role or material."""
-    import ezdxf
-
     document = ezdxf.new("R2000")
     document.header["$INSUNITS"] = 6
     document.appids.add(APPLICATION)

@@ -7,6 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from ezdxf.acis import api
+from ezdxf.render import MeshBuilder
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.solids import fans
@@ -38,8 +40,6 @@ def is_mesh(entity: Any) -> bool:
 
 def drawn_mesh(entity: Any, handle: str) -> Mesh:
     """Take the mesh of an entity, as placed by the blocks that insert it."""
-    from ezdxf.render import MeshBuilder
-
     kind, layer = entity.dxftype(), str(entity.dxf.layer)
     curved = ""
     if kind in SOLIDS:
@@ -56,8 +56,6 @@ def drawn_mesh(entity: Any, handle: str) -> Mesh:
 
 def _flat_faces(entity: Any) -> tuple[list[Any], str]:
     """Meshes of the flat faces of a solid, and its kind if it has others."""
-    from ezdxf.acis import api
-
     try:
         bodies = list(api.load_dxf(entity))
         meshes = [mesh for body in bodies for mesh in api.mesh_from_body(body)]

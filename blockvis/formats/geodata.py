@@ -17,6 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from shapely.errors import ShapelyError
+from shapely.geometry import shape
 
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
@@ -59,6 +62,38 @@ ENVELOPES = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}
 
 
 @dataclass(frozen=True)
+class System:
+    """A coordinate system: its unit of length, "" where nothing says it, and its name if it is in degrees.
+
+    ``mercator`` is the scale of a Mercator at the equator and its northing there; ``is_none`` whether the file says
+    that it has no system.
+    """
+
+    unit: str = ""
+    degrees: str = ""
+    mercator: tuple[float, float] | None = None
+    is_none: bool = False
+
+    @classmethod
+    def of(cls, text: str) -> System:
+        """Read a system in words."""
+        # Heights have a system of their own behind that of the plan, and often another unit.
+        plan = re.split(r"\bVERT\w*\s*\[", text)[0]
+        head = re.search(r'\b(PROJCS|PROJCRS|GEOGCS|GEOGCRS|GEODCRS|LOCAL_CS|ENGCRS)\s*\[\s*"([^"]*)"', plan)
+        if head is None:
+            return cls(mercator=_mercator(text))
+        if head[1].startswith("GEO"):
+            return cls(degrees=head[2], mercator=_mercator(text))
+        found = re.findall(r'\b(?:LENGTH)?UNIT\s*\[\s*"[^"]*"\s*,\s*([-+.\deE]+)', plan)
+        try:
+            metres = float(found[-1]) if found else 0.0
+        except ValueError:
+            metres = 0.0
+        unit = unit_of(metres, 1e-5) or (f"{metres:.9g} m" if 0.0 < metres < math.inf else "")
+        return cls(unit, mercator=_mercator(text))
+
+
+@dataclass(frozen=True)
 class Feature:
     """A geometry of shapely with its attributes, and the layer on which it lies."""
 
@@ -77,9 +112,8 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     name = str(properties.get("name", "")) if isinstance(properties, dict) else ""
     says = name if re.search(r"CRS84|4326$", name) else ""
     known = [one for one in features if one is not None]
-    lengths, skipped = "crs" in content and crs is None, {NO_GEOMETRY: len(features) - len(known)}
-    mercator = _mercator(name)
-    return layout_of_features(known, path, reading, degrees=says, lengths=lengths, mercator=mercator, skipped=skipped)
+    system = System(degrees=says, mercator=_mercator(name), is_none="crs" in content and crs is None)
+    return layout_of_features(known, path, reading, system, {NO_GEOMETRY: len(features) - len(known)})
 
 
 def _geojson_features(content: Mapping[str, Any]) -> list[Any]:
@@ -93,9 +127,6 @@ def _geojson_features(content: Mapping[str, Any]) -> list[Any]:
 
 def _feature(found: Any, number: int) -> Feature | None:
     """Make a feature of a member of GeoJSON; None of one without geometry."""
-    from shapely.errors import ShapelyError
-    from shapely.geometry import shape
-
     whole = isinstance(found, dict) and found.get("type") == "Feature"
     geometry = found.get("geometry") if whole else found
     if geometry is None:
@@ -120,7 +151,6 @@ def read(path: Path, reading: Reading) -> Layout:
 def _read_shapefile(path: Path, reading: Reading) -> Layout:
     require("geo", f"shapefiles ('{path}'; GeoJSON and GeoPackage are read without)")
     import shapefile
-    from shapely.geometry import shape
 
     beside = {entry.suffix.lower(): entry for entry in path.parent.glob(f"{escape(path.stem)}.*")}
     table, projection = beside.get(".dbf"), beside.get(".prj")
@@ -144,9 +174,7 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
             row = records[k] if k < len(records) else {}
             features.append(Feature(shape(drawn.__geo_interface__), row))
     text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
-    unit, degrees = _unit_of_system(text)
-    mercator = _mercator(text)
-    return layout_of_features(features, path, reading, unit=unit, degrees=degrees, mercator=mercator, skipped=skipped)
+    return layout_of_features(features, path, reading, System.of(text), skipped)
 
 
 def _read_geopackage(path: Path, reading: Reading) -> Layout:
@@ -157,22 +185,19 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
     except (sqlite3.Error, IndexError) as error:
         # Python's error where a table lacks the column that the contents name.
         raise ValueError(f"it is no readable GeoPackage ({error}); export it again") from None
-    named = [layer.name for layer in layers]
-    chosen = [name for name in named if matches([name], reading.only)] or named
-    wanted = [one for one in layers if one.name in chosen and not matches([one.name], reading.ignore)]
+    chosen = [one for one in layers if matches([one.name], reading.only)] or layers
+    wanted = [one for one in chosen if not matches([one.name], reading.ignore)]
     systems = {layer.system: layer for layer in reversed(wanted)}
     if len(systems) > 1:
         listed = ", ".join(f"'{one.name}' in {one.system or 'none'}" for one in reversed(systems.values()))
         raise ValueError(
             f"it has layers in several coordinate systems: {listed}; leave one out (ignore), or export one"
         )
-    text = next((layer.description for layer in systems.values()), "")
-    unit, degrees = _unit_of_system(text)
+    system = System.of("".join(layer.description for layer in systems.values()))
     # What is left out as asked is counted with the rest, but not what lies in another system.
     features = [feature for layer in layers if layer.system in systems for feature in layer.features]
     skipped = {NO_GEOMETRY: sum(layer.empty for layer in layers if layer.system in systems)}
-    mercator = _mercator(text)
-    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees, mercator=mercator, skipped=skipped)
+    found = layout_of_features(features, path, reading, system, skipped)
     other = [LeftOut("asked", np.zeros((0, 2)), "", one.name) for one in layers if one.system not in systems]
     return replace(found, left_out=(*found.left_out, *other))
 
@@ -208,8 +233,6 @@ def _layers(base: sqlite3.Connection, path: Path) -> list[_Layer]:
 
 
 def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Feature:
-    import shapely
-
     blob = row.pop(column)
     called = f"geometry {row.get('fid', '?')} of layer '{layer}'"
     if not isinstance(blob, bytes) or blob[:2] != b"GP" or len(blob) < 8:
@@ -224,25 +247,8 @@ def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Fe
     except NotImplementedError:
         remedy = f"ogr2ogr -nlt CONVERT_TO_LINEAR {path.stem}_straight.gpkg {path.name}"
         raise ValueError(f"{called} has arcs or is in space, which is not read; straighten it: {remedy}") from None
-    except (shapely.errors.ShapelyError, ValueError, TypeError) as error:
+    except (ShapelyError, ValueError, TypeError) as error:
         raise ValueError(f"{called} cannot be read ({' '.join(str(error).split())}); export it again") from None
-
-
-def _unit_of_system(text: str) -> tuple[str, str]:
-    """Find the unit of length of a coordinate system in words, "" for none, and its name if it is in degrees."""
-    # Heights have a system of their own behind that of the plan, and often another unit.
-    text = re.split(r"\bVERT\w*\s*\[", text)[0]
-    head = re.search(r'\b(PROJCS|PROJCRS|GEOGCS|GEOGCRS|GEODCRS|LOCAL_CS|ENGCRS)\s*\[\s*"([^"]*)"', text)
-    if head is None:
-        return "", ""
-    if head[1].startswith("GEO"):
-        return "", head[2]
-    found = re.findall(r'\b(?:LENGTH)?UNIT\s*\[\s*"[^"]*"\s*,\s*([-+.\deE]+)', text)
-    try:
-        metres = float(found[-1]) if found else 0.0
-    except ValueError:
-        return "", ""
-    return unit_of(metres, 1e-5) or (f"{metres:.9g} m" if 0.0 < metres < math.inf else ""), ""
 
 
 def _mercator(text: str) -> tuple[float, float] | None:
@@ -258,12 +264,14 @@ def _mercator(text: str) -> tuple[float, float] | None:
     return scale * math.cos(math.radians(parallel)), given.get("false northing", 0.0)
 
 
-def _true_unit(found: Drawing, reading: Reading, unit: str, mercator: tuple[float, float]) -> tuple[str, list[Note]]:
+def _true_unit(found: Drawing, reading: Reading, system: System) -> tuple[str, list[Note]]:
     """Find how long the unit of a Mercator is where a drawing lies, with a note; the unit itself where it is as long.
 
     What is left out as asked, as a scale bar, does not count, and what lies far from the rest does not matter.
     """
-    (scale, start), metres = mercator, metres_per(unit or "m")
+    if system.mercator is None or reading.unit is not None:
+        return system.unit, []
+    (scale, start), metres = system.mercator, metres_per(system.unit or "m")
     wanted = found.wants(reading)
     # Before it is turned into its plane: (n, 3).
     middles = [float(one.points[:, 1].mean()) for one in found.strokes if wanted(one)]
@@ -271,7 +279,7 @@ def _true_unit(found: Drawing, reading: Reading, unit: str, mercator: tuple[floa
     # Beyond is no map.
     stretch = scale * math.cosh(north) if abs(north) <= math.pi else 1.0
     if abs(stretch - 1.0) < 1e-3:
-        return unit or "m", []
+        return system.unit or "m", []
     latitude = math.degrees(math.atan(math.sinh(north)))
     said = (
         f"unit: the file is in a Mercator, as EPSG:3857 is, which draws lengths {stretch:.4g} times as long at "
@@ -282,22 +290,9 @@ def _true_unit(found: Drawing, reading: Reading, unit: str, mercator: tuple[floa
 
 
 def layout_of_features(
-    features: Sequence[Feature],
-    path: Path,
-    reading: Reading,
-    *,
-    unit: str = "",
-    degrees: str,
-    lengths: bool = False,
-    mercator: tuple[float, float] | None,
-    skipped: Mapping[str, int],
+    features: Sequence[Feature], path: Path, reading: Reading, system: System, skipped: Mapping[str, int]
 ) -> Layout:
-    """Make a layout of polygons, and of the faces between lines.
-
-    ``unit`` is "" where the file does not say it, ``degrees`` the name of a system of longitude and latitude;
-    ``lengths`` says whether the file says that it has no system, ``mercator`` is the scale of a Mercator at the equator
-    and its northing there, and ``skipped`` counts by its kind what is no outline.
-    """
+    """Make a layout of polygons, and of the faces between lines; ``skipped`` counts by its kind what is no outline."""
     found, rows = Drawing(skipped=Counter(skipped)), _rows(features)
     roles = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
     for feature, row in zip(features, rows, strict=True):
@@ -306,9 +301,10 @@ def layout_of_features(
         if len(parts := found.outlines[first:]) > 1:
             named = [{**row, "name": f"{row['name']} {k + 1}"} for k in range(len(parts))]
             found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
-    true, stretched = _true_unit(found, reading, unit, mercator) if mercator and reading.unit is None else (unit, [])
+    true, stretched = _true_unit(found, reading, system)
     turn, notes = found.turn(reading)
-    if stretched and not (turn == np.eye(3)).all():
+    in_plan = (turn == np.eye(3)).all()
+    if stretched and not in_plan:
         raise ValueError(
             "its polygons stand upright in a Mercator, which stretches lengths but no heights; reproject it"
         )
@@ -316,23 +312,16 @@ def layout_of_features(
     if roles:
         listed = ", ".join(f"'{role}'" for role in roles)
         found.notes.append(Note(CHANGED, f"roles were left out ({listed}): roles are {', '.join(mechanics.ROLES)}"))
-    _check_degrees(found, path, reading, degrees, far=not (unit or degrees or lengths) and (turn == np.eye(3)).all())
+    unknown = not (system.unit or system.degrees or system.is_none)
+    _check_degrees(found, path, reading, system.degrees, far=unknown and in_plan)
     found.notes += stretched
-    with_faces(
-        found,
-        reading,
-        called=lambda name, k: f"{name} {k + 1}",
-        row_of=lambda layers, name: _row(name, layers[-1], {}),
-        in_place=True,
-    )
+    with_faces(found, reading, row_of=lambda layers, name: _row(name, layers[-1], {}), in_place=True)
     refuse_open(found, "polygon", "one polygon", true)
     found.notes += passed_over(found.skipped)
     return found.layout(true)
 
 
 def _add(geometry: Any, row: dict[str, Any], found: Drawing) -> None:
-    import shapely
-
     kind = geometry.geom_type
     if geometry.is_empty:
         found.skipped["empty geometries"] += 1
@@ -361,8 +350,6 @@ def _add(geometry: Any, row: dict[str, Any], found: Drawing) -> None:
 
 def _points(line: Any) -> np.ndarray:
     """(n, 3) array: the points of a line; where it has no elevations they are 0."""
-    import shapely
-
     points = shapely.get_coordinates(line, include_z=True)
     points[:, 2] = np.nan_to_num(points[:, 2])
     return np.asarray(points)

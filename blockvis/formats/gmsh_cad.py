@@ -16,7 +16,7 @@ from blockvis.system.extras import install_command
 from blockvis.system.worker import Worker, WorkerEnded
 
 from . import gmsh_mesh
-from .bodies import Bodies, Body
+from .bodies import MOST_FACES, Bodies, Body
 from .reading import Reading
 
 #: A geometry script that takes longer is stopped: it may never end.
@@ -68,7 +68,7 @@ def _meshed(path: Path, target: Path, chords: int) -> list[dict[str, object]] | 
     """Have a file meshed: its bodies, or None where it has surfaces only, whose mesh is then in the target."""
     worker = Worker("blockvis.formats.gmsh_process", errors=True)
     try:
-        worker.say("mesh", (str(path.resolve()), str(target), chords, MOST_MEMORY))
+        worker.say("mesh", (str(path.resolve()), str(target), chords, MOST_MEMORY, MOST_FACES))
         bodies: list[dict[str, object]] | None = worker.hear("mesh", "bodies", seconds=LONGEST_SECONDS)[1]
     except TimeoutError:
         raise ValueError(f"gmsh did not finish within {LONGEST_SECONDS} s; give it as .msh") from None

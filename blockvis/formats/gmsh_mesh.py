@@ -287,7 +287,7 @@ def _nodes_41(numbers: _Numbers, mesh: _Mesh) -> None:
         tags.append(numbers.take("size", n))
         width = 3 + (int(dimension) if parametric else 0)
         parts.append(numbers.take("double", n * width).reshape(n, width)[:, :3])
-    _set_nodes(mesh, numbers, np.concatenate(tags), np.concatenate(parts))
+    _set_nodes(mesh, np.concatenate(tags), np.concatenate(parts))
 
 
 def _nodes_22(numbers: _Numbers, mesh: _Mesh) -> None:
@@ -298,13 +298,13 @@ def _nodes_22(numbers: _Numbers, mesh: _Mesh) -> None:
         if n * record.itemsize > len(numbers.body) - numbers.position:
             numbers.take("int", record.itemsize // 4 * n)
         found = np.frombuffer(numbers.body, record, n, numbers.position)
-        _set_nodes(mesh, numbers, found["tag"].astype(np.int64), found["x"].astype(float))
+        _set_nodes(mesh, found["tag"].astype(np.int64), found["x"].astype(float))
     else:
         values = numbers.take("double", 4 * n).reshape(n, 4)
-        _set_nodes(mesh, numbers, values[:, 0].astype(np.int64), values[:, 1:])
+        _set_nodes(mesh, values[:, 0].astype(np.int64), values[:, 1:])
 
 
-def _set_nodes(mesh: _Mesh, numbers: _Numbers, tags: np.ndarray, coordinates: np.ndarray) -> None:
+def _set_nodes(mesh: _Mesh, tags: np.ndarray, coordinates: np.ndarray) -> None:
     mesh.coordinates = coordinates
     mesh.nodes, mesh.places = np.unique(tags, return_index=True)
     if len(mesh.nodes) < len(tags):
@@ -319,7 +319,7 @@ def _elements_41(numbers: _Numbers, mesh: _Mesh) -> None:
         n = numbers.one("size")
         width = _width(kind, numbers)
         values = numbers.take("size", n * (width + 1)).reshape(n, width + 1)[:, 1:]
-        _add(mesh, numbers, dimension, kind, values, np.full(n, tag))
+        _add(mesh, dimension, kind, values, np.full(n, tag))
 
 
 def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
@@ -343,7 +343,7 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
             groups = mesh.groups.setdefault((dimension, tag), [])
             if group and group not in groups:
                 groups.append(group)
-        _add(mesh, numbers, dimension, kind, rows[:, n_tags:], entity)
+        _add(mesh, dimension, kind, rows[:, n_tags:], entity)
 
 
 def _width(kind: int, numbers: _Numbers) -> int:
@@ -352,19 +352,19 @@ def _width(kind: int, numbers: _Numbers) -> int:
     return N_NODES[kind]
 
 
-def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.ndarray, tags: np.ndarray) -> None:
+def _add(mesh: _Mesh, dimension: int, kind: int, nodes: np.ndarray, tags: np.ndarray) -> None:
     if dimension == 2 and kind in GMSH:
-        mesh.rings.append(_known(mesh, numbers, ring_of_nodes(nodes, GMSH[kind])))
+        mesh.rings.append(_known(mesh, ring_of_nodes(nodes, GMSH[kind])))
         mesh.surfaces.append(tags)
     elif dimension == 3 and kind in GMSH_SOLIDS:
         corners = 1 + max(corner for face in GMSH_SOLIDS[kind] for corner in face)
-        mesh.solids.append((GMSH_SOLIDS[kind], _known(mesh, numbers, nodes[:, :corners])))
+        mesh.solids.append((GMSH_SOLIDS[kind], _known(mesh, nodes[:, :corners])))
         mesh.volumes.append(tags)
     else:
         mesh.other_elements += len(nodes)
 
 
-def _known(mesh: _Mesh, numbers: _Numbers, nodes: np.ndarray) -> np.ndarray:
+def _known(mesh: _Mesh, nodes: np.ndarray) -> np.ndarray:
     """Replace the numbers of nodes by their positions among the coordinates."""
     missing = nodes[~np.isin(nodes, mesh.nodes)]
     if len(missing):

@@ -15,9 +15,8 @@ from blockvis.system.worker import Say, end_with_caller, serve
 #: Points of a curve at which its direction is looked at.
 SAMPLES = 129
 
-#: Faces that are bent both ways are within such a part of the mean depth of their body (volume by surface) of it, but
-#: have no more than so many triangles of equal sides, of which the plane faces of a stone are joined.
-SAGITTA, MOST_TRIANGLES = 0.03, 400
+#: Faces that are bent both ways are within such a part of the mean depth of their body (volume by surface) of it.
+SAGITTA = 0.03
 
 #: Chords of one curve: finer than any drawing.
 MOST_CHORDS = 4096
@@ -34,8 +33,10 @@ def _answer(say: Say, word: str, about: Any) -> bool:
     return True
 
 
-def _meshed(source: str, target: str, chords: int, memory: int) -> tuple[str, Any]:
+def _meshed(source: str, target: str, chords: int, memory: int, most: int) -> tuple[str, Any]:
     """Mesh a geometry file with so many chords of a full circle, and so many bytes of memory.
+
+    Faces that are bent both ways have at most so many triangles of equal sides, of which plane faces are joined.
 
     Gives "bodies" and these, of triangles, if it has volumes; else "mesh", which is then in the target (.msh).
     Raises ``ImportError`` if the library cannot be loaded, and ``Exception`` as gmsh does.
@@ -62,7 +63,7 @@ def _meshed(source: str, target: str, chords: int, memory: int) -> tuple[str, An
         gmsh.open(source)
         volumes = [tag for _, tag in gmsh.model.getEntities(3)]
         _only_outlines(gmsh, chords)
-        _points_within(gmsh)
+        _points_within(gmsh, most)
         gmsh.model.mesh.generate(2)
         if volumes:
             return "bodies", [_body(gmsh, tag) for tag in volumes]
@@ -112,7 +113,7 @@ def _only_outlines(gmsh, chords: int) -> None:  # type: ignore[no-untyped-def]
         gmsh.model.mesh.setTransfiniteCurve(tag, 1 + _chords(gmsh, tag, 2.0 * math.pi / chords))
 
 
-def _points_within(gmsh) -> None:  # type: ignore[no-untyped-def]
+def _points_within(gmsh, most: int) -> None:  # type: ignore[no-untyped-def]
     """Have the faces that are bent both ways meshed with points within: their outlines say nothing of their bulge."""
     size: dict[int, float] = {}
     # The built-in kernel of .geo tells no volumes.
@@ -123,7 +124,7 @@ def _points_within(gmsh) -> None:  # type: ignore[no-untyped-def]
             area = {face: gmsh.model.occ.getMass(2, face) for face in faces}
             off = SAGITTA * gmsh.model.occ.getMass(3, volume) / sum(area.values())
             # A triangle of the side h has an area of 0.43 h², and is off a face of the curvature k by k h² / 8.
-            off = max(off, sum(area[face] * bend for face, bend in bends.items()) / (0.43 * 8.0 * MOST_TRIANGLES))
+            off = max(off, sum(area[face] * bend for face, bend in bends.items()) / (0.43 * 8.0 * most))
             size |= {face: math.sqrt(8.0 * off / bend) for face, bend in bends.items()}
     if not size:
         return

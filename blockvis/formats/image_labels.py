@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image, ImageColor
+from scipy import ndimage
 
 #: An image is exact where at least this share of pixels is like those right of it and below: less is noise or blur.
 EXACT = 0.6
@@ -101,15 +102,11 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
     if wanted is not None and wanted not in known:
         raise ValueError(f"it has no background {background!r}; its values are {', '.join(called[:8])}")
     mask = len(known) == 2
-    outer: int | None
     lines = _lines_of_mask(numbers) if mask else None
-    if wanted is not None:
-        outer = known.index(wanted)
-    elif lines is not None:
-        outer = lines
-    elif mask:
+    outer = lines if wanted is None else known.index(wanted)
+    if outer is None and mask:
         outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
-    else:
+    elif outer is None:
         outer = _background(numbers, known, coloured=coloured or not exact)
     if not exact and _is_painted(found, outer):
         raise Photograph
@@ -146,8 +143,6 @@ def _filled(numbers: np.ndarray, found: _Found, outer: int | None, reach: float)
 
     Beside the numbers (height, width) it gives rows and columns of the nearest pixel that is of a stone.
     """
-    from scipy import ndimage
-
     between, ground = numbers < 0, numbers == (-1 if outer is None else outer)
     nearest = tuple(ndimage.distance_transform_edt(between | ground, return_distances=False, return_indices=True))
     stone = numbers[nearest]
@@ -245,8 +240,6 @@ def _is_painted(found: _Found, outer: int | None) -> bool:
 
     The noise of a codec, or of a scan, is everywhere.
     """
-    from scipy import ndimage
-
     same, shares = _same(found.shown), dict[int, float]()
     for k in range(len(found.values)):
         other = (found.numbers >= 0) & (found.numbers != k)
@@ -259,8 +252,6 @@ def _is_painted(found: _Found, outer: int | None) -> bool:
 
 def _of_values(values: np.ndarray, image: Image.Image, wanted: int | None) -> _Found:
     """Find the labels of an exact image; the value of a background that is asked for is one."""
-    from scipy import ndimage
-
     known, inverse = np.unique(values, return_inverse=True)
     place = inverse.reshape(values.shape).astype(np.int32)
     share = np.bincount(place.ravel(), minlength=len(known)) / place.size
@@ -304,8 +295,6 @@ def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np
 
     ``place`` (height, width) numbers the values of pixels, of which two are labels.
     """
-    from scipy import ndimage
-
     colours = shown.reshape(-1, shown.shape[2])[np.unique(place.ravel(), return_index=True)[1]]
     one, other = colours[label]
     if np.abs(one - other).max() <= 2 * FLAT:
@@ -319,8 +308,6 @@ def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np
 
 
 def _of_noise(image: Image.Image) -> _Found:
-    from scipy import ndimage
-
     if image.mode in ("I", "F") or image.mode.startswith("I;16"):
         # As 8 bits Pillow takes what is above 255 for white.
         deep = np.asarray(image).astype(float)
@@ -412,8 +399,6 @@ def _are_lines(mask: np.ndarray, paper: np.ndarray) -> bool:
 
     Small stones are as narrow as lines are. Both arrays are (height, width), of bools; some pixels may be in neither.
     """
-    from scipy import ndimage
-
     # Nothing lies beyond the rim.
     size = max(3, round(WIDEST_LINE * min(mask.shape)))
     if not mask.any() or ndimage.minimum_filter(mask, size, mode="constant").any():
@@ -429,8 +414,6 @@ def _are_lines(mask: np.ndarray, paper: np.ndarray) -> bool:
 
 def _background_of_mask(numbers: np.ndarray) -> int:
     """Choose which of two values is that of joints: that between more stones; of both alike, that on the rim."""
-    from scipy import ndimage
-
     pieces = []
     for k in (0, 1):
         found, n = ndimage.label(numbers != k)

@@ -1,14 +1,17 @@
-"""Where the pixels of an image lie: by the keys of the case, a world file beside it, or the tags of a GeoTIFF."""
+"""Images opened, and where their pixels lie: by keys of the case, a world file beside it, or tags of a GeoTIFF."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from numbers import Real
 from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
+from PIL import Image, ImageOps, TiffTags, UnidentifiedImageError
 
 from .reading import Reading
 
@@ -38,8 +41,8 @@ class ImageKeys(TypedDict, total=False):
     outline_tolerance: float | None
 
 
-#: Tags of GeoTIFF: size of a pixel, tie point, matrix, keys.
-_SIZE, _TIE, _MATRIX, _KEYS = 33550, 33922, 34264, 34735
+#: More pixels than this are refused before they fill the memory.
+MOST_PIXELS = 60_000_000
 
 #: Keys of GeoTIFF: kind of model (2 is in degrees), where a pixel is named (2: its middle), unit of length.
 _MODEL, _RASTER, _LENGTH = 1024, 1025, 3076
@@ -73,12 +76,38 @@ class Placement:
         return points @ self.matrix[:, :2].T + self.matrix[:, 2]
 
 
+def opened(path: Path) -> tuple[Image.Image, Mapping[str, Any]]:
+    """Open an image, upright, and read its tags by their names, if it is a TIFF."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            # Of files by name Pillow maps TIFFs into memory, and shears those that lie on their side.
+            content = path.read_bytes()
+            image = Image.open(BytesIO(content))
+        width, height = image.size
+        if width * height > MOST_PIXELS:
+            raise ValueError(
+                f"'{path}' has {width} × {height} pixels, more than {MOST_PIXELS}; scale it down, or cut it"
+            )
+        tags = {TiffTags.lookup(number).name: value for number, value in getattr(image, "tag_v2", {}).items()}
+        # A lossy WebP blurs colours as a JPEG does.
+        form = "JPEG" if image.format == "WEBP" and b"VP8L" not in content else image.format
+        image.load()
+        upright = ImageOps.exif_transpose(image)
+    except (UnidentifiedImageError, Image.DecompressionBombError):
+        raise ValueError(f"'{path}' is no image that can be read, or too large a one; write it as PNG") from None
+    except (OSError, SyntaxError, EOFError, IndexError, TypeError) as error:
+        raise ValueError(f"'{path}' is a damaged image ({error}); write it again as PNG") from None
+    upright.format = form
+    return upright, tags
+
+
 def placement_of(
     path: Path,
     size: tuple[float, float] | None,
     reading: Reading,
     image: Path | None = None,
-    tags: Mapping[int, Any] | None = None,
+    tags: Mapping[str, Any] | None = None,
 ) -> Placement:
     """Find where the pixels of an image lie, or of the image of annotations; the path is named in messages.
 
@@ -103,7 +132,7 @@ def placement_of(
     )
 
 
-def written_placement(path: Path, tags: Mapping[int, Any], said: Mapping[str, float]) -> Placement | None:
+def written_placement(path: Path, tags: Mapping[str, Any], said: Mapping[str, float]) -> Placement | None:
     """Read where an image lies from the world file beside it or its tags; None where neither says it."""
     return _of_world_file(path) or _of_tags(path, tags, said)
 
@@ -158,17 +187,17 @@ def _of_world_file(image: Path) -> Placement | None:
     return Placement(matrix, "", f"world file {file.name}")
 
 
-def _of_tags(path: Path, tags: Mapping[int, Any], said: Mapping[str, float]) -> Placement | None:
+def _of_tags(path: Path, tags: Mapping[str, Any], said: Mapping[str, float]) -> Placement | None:
     """Read the tags of a GeoTIFF; None if it has none."""
-    if _MATRIX in tags:
-        matrix = np.array(tags[_MATRIX], dtype=float).reshape(4, 4)[:2, [0, 1, 3]]
-    elif _SIZE in tags and _TIE in tags:
-        sx, sy = (float(value) for value in tags[_SIZE][:2])
-        column, row, _, x, y, *_ = (float(value) for value in tags[_TIE][:6])
+    if "ModelTransformationTag" in tags:
+        matrix = np.array(tags["ModelTransformationTag"], dtype=float).reshape(4, 4)[:2, [0, 1, 3]]
+    elif {"ModelPixelScaleTag", "ModelTiepointTag"} <= {*tags}:
+        sx, sy = map(float, tags["ModelPixelScaleTag"][:2])
+        column, row, _, x, y, *_ = map(float, tags["ModelTiepointTag"][:6])
         matrix = np.array([[sx, 0.0, x - column * sx], [0.0, -sy, y + row * sy]])
     else:
         return None
-    directory = np.array(tags.get(_KEYS, (1, 1, 0, 0)), dtype=int)[4:]
+    directory = np.array(tags.get("GeoKeyDirectoryTag", (1, 1, 0, 0)), dtype=int)[4:]
     keys = {int(key): int(value) for key, where, _, value in directory[: len(directory) // 4 * 4].reshape(-1, 4)
             if where == 0}  # fmt: skip
     if keys.get(_MODEL) == 2:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Collection, Mapping, Sequence
-from io import BytesIO
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from PIL import Image, ImageOps, UnidentifiedImageError
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
@@ -19,12 +15,9 @@ from blockvis.text import listed, numbered
 from solver.mechanics import counted
 
 from .image_labels import Labels, Photograph, labels_of
-from .image_scale import Placement, placement_of
+from .image_scale import Placement, opened, placement_of
 from .pixels import SPECK, SPECK_OF_NOISE, STAIRS, Outlined, Regions, outlined, regions_of
 from .reading import Reading
-
-#: More pixels than this are refused before they fill the memory.
-MOST_PIXELS = 60_000_000
 
 #: More of the pixels than this without a label's value, or of the regions with holes, are those of another picture.
 MOST_MOVED, MOST_HOLED = 0.25, 0.5
@@ -60,32 +53,6 @@ def read(path: Path, reading: Reading) -> Layout:
             f"mask of it ({MASK_MAKERS}), and put the photograph under the pictures: [output] underlay"
         ) from None
     return layout_of_labels(labels, placement, reading)
-
-
-def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
-    """Open an image, upright, and read its tags, if it is a TIFF."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            # Of files by name Pillow maps TIFFs into memory, and shears those that lie on their side.
-            content = path.read_bytes()
-            image = Image.open(BytesIO(content))
-        width, height = image.size
-        if width * height > MOST_PIXELS:
-            raise ValueError(
-                f"'{path}' has {width} × {height} pixels, more than {MOST_PIXELS}; scale it down, or cut it"
-            )
-        tags = dict(getattr(image, "tag_v2", {}))
-        # A lossy WebP blurs colours as a JPEG does.
-        form = "JPEG" if image.format == "WEBP" and b"VP8L" not in content else image.format
-        image.load()
-        upright = ImageOps.exif_transpose(image)
-    except (UnidentifiedImageError, Image.DecompressionBombError):
-        raise ValueError(f"'{path}' is no image that can be read, or too large a one; write it as PNG") from None
-    except (OSError, SyntaxError, EOFError, IndexError, TypeError) as error:
-        raise ValueError(f"'{path}' is a damaged image ({error}); write it again as PNG") from None
-    upright.format = form
-    return upright, tags
 
 
 def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> Layout:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field, replace
+from itertools import chain, compress
 from typing import Any
 
 import numpy as np
+import shapely
+from scipy.spatial import cKDTree
 
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
-from blockvis.layout.outlines import ring_width
+from blockvis.layout.outlines import ends_of, ring_width
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
@@ -54,28 +57,30 @@ def with_faces(
     drawing: Drawing,
     reading: Reading,
     *,
-    called: Callable[[str, int], str],
     row_of: Callable[[tuple[str, ...], str], dict[str, Any]],
+    called: Callable[[str, int], str] = lambda name, k: f"{name} {k + 1}",
     tolerance: float | None = None,
     in_place: bool = False,
 ) -> None:
     """Let curves share corners, add the faces between lines to a drawing, and cut its outlines along lines in them.
 
     The drawing is in the plane. Lines that are not wanted are left out, and outlines that are not wanted are not cut.
-    ``called`` names a piece by its outline's name and its number, from 0; ``row_of`` writes the row of a face by the
-    layers around most of its lines, and its name. Pieces come ``in_place`` of their outline, or behind the others. The
+    ``row_of`` writes the row of a face by the layers around most of its lines, and its name; ``called`` names a piece
+    by its outline's name and its number, from 0. Pieces come ``in_place`` of their outline, or behind the others. The
     tolerance is as of :func:`blockvis.formats.arcs.with_shared_corners`.
     """
     if not drawing.strokes:
         return
     wants = drawing.wants(reading)
-    lines = drawing.without_lines(wants)
+    drawing.left_out += [outline.left_out(name) for outline, name in drawing.holed]
+    drawing.left_out += [line.left_out("asked line") for line in drawing.loose if not wants(line)]
+    lines = [*filter(wants, drawing.loose)]
     ignored = {k for k, one in enumerate(drawing.outlines) if not wants(one)}
     size = float(np.ptp(np.concatenate([stroke.points for stroke in drawing.strokes]), axis=0).max())
-    drawn, n = [*drawing.outlines, *lines], len(drawing.outlines)
+    drawn: list[Any] = [*drawing.outlines, *lines]
     shared = with_shared_corners([one.points for one in drawn], [one.curves for one in drawn], tolerance)
-    drawing.outlines = [replace(one, points=points) for one, points in zip(drawing.outlines, shared, strict=False)]
-    lines = [replace(line, points=points) for line, points in zip(lines, shared[n:], strict=True)]
+    drawn, n = [replace(one, points=points) for one, points in zip(drawn, shared, strict=True)], len(drawing.outlines)
+    drawing.outlines, lines = drawn[:n], drawn[n:]
     faces = faces_of_lines(lines, drawing.outlines, ignored, reading.only)
     for i, pieces in sorted(faces.pieces.items(), reverse=True):
         whole = drawing.outlines.pop(i)
@@ -102,27 +107,24 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     beyond, as an axis or a dimension does, cuts nothing. An outline around lines that do not reach it stays whole.
     Joints may be drawn as pairs of lines: the strips between them are left out as mortar.
     """
-    import shapely
-    from scipy.spatial import cKDTree
-
     found = Faces()
-    axes = [line.chain and not matches([line.layer, *line.looks], only) for line in lines]
-    found.left_out += [_axis(line) for line, is_axis in zip(lines, axes, strict=True) if is_axis]
-    lines = [line for line, is_axis in zip(lines, axes, strict=True) if not is_axis]
+    axes = dict.fromkeys(one for one in lines if one.chain and not matches([one.layer, *one.looks], only))
+    found.left_out += map(_axis, axes)
+    lines = [line for line in lines if line not in axes]
     flat, rings = [line.points for line in lines], [outline.points for outline in outlines]
     if not flat:
         return found
     every = cKDTree(np.concatenate([*flat, *rings]))
     kept = [ring for i, ring in enumerate(rings) if i not in ignored]
     size = float(np.ptp(np.concatenate([*flat, *kept]), axis=0).max())
-    usable = [i for i, ring in enumerate(rings) if float(np.ptp(ring, axis=0).max()) > GRID * size]
-    flat += [np.concatenate([rings[i], rings[i][:1]]) for i in usable]
-    flat = _joined(flat, len(lines), [*(line.off for line in lines), *(outlines[i].off for i in usable)], size, found)
-    segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
+    usable = {i: one for i, one in enumerate(outlines) if float(np.ptp(one.points, axis=0).max()) > GRID * size}
+    flat += [np.concatenate([one.points, one.points[:1]]) for one in usable.values()]
+    flat = _joined(flat, len(lines), [one.off for one in (*lines, *usable.values())], size, found)
+    segments = shapely.set_precision(_lines(flat[: len(lines)]), GRID * size)
     outlined = dict(zip(usable, flat[len(lines) :], strict=True))
     cutting, openings = _cut_outlines(outlined, ignored, segments, every, size, found)
-    rest = [k for k in range(len(lines)) if k not in cutting]
-    _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
+    rest = np.setdiff1d(np.arange(len(lines)), [*cutting])
+    _add_faces([lines[k] for k in rest], segments[rest], kept, every, size, found)
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
     found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
     if found.faces:
@@ -130,6 +132,11 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
         said += f"{counted(len(lines), 'loose line')}; an opening enclosed by lines counts as a block too: "
         found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines"))
     return found
+
+
+def _lines(drawn: Iterable[np.ndarray]) -> np.ndarray:
+    """(n,) array: lines of shapely of these points."""
+    return np.array([shapely.LineString(points) for points in drawn], dtype=object)
 
 
 def _axis(line: Line) -> LeftOut:
@@ -145,8 +152,6 @@ def _cut_outlines(
     outlines: dict[int, np.ndarray], ignored: Set[int], segments: Any, every: Any, size: float, found: Faces
 ) -> tuple[set[int], set[int]]:
     """Cut outlines, by their numbers, along the lines within them; numbers of these lines, and of outlines cut out."""
-    import shapely
-
     cutting, openings = set[int](), set[int]()
     tree = shapely.STRtree(segments)
     areas = shapely.STRtree([shapely.Polygon(ring) for ring in outlines.values()])
@@ -189,56 +194,62 @@ def _cut_notes(found: Faces, n_lines: int, openings: Set[int]) -> list[Note]:
 
 def _without_mortar(found: Faces, reach: float) -> list[Note]:
     """Leave out the strips between pairs of lines, if they are as many as joints are, and say so; else doubt them."""
-    import shapely
-
-    every = [(-1, face.ring) for face in found.faces]
-    every += [(i, ring) for i, own in found.pieces.items() for ring in own]
-    if not every:
-        return []
-    shapes = np.array([shapely.Polygon(ring) for _, ring in every], dtype=object)
-    widths, areas = np.array([ring_width(ring) for _, ring in every]), shapely.area(shapes)
-    order = np.argsort(widths)
-    thin = widths < STRIP * widths[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())]
-    if not thin.any():
-        return []
-    i, j = shapely.STRtree(shapes).query(shapes, "dwithin", reach)
-    beside, borders = shapely.buffer(shapes, reach), shapely.get_exterior_ring(shapes)
-    along = shapely.length(shapely.intersection(borders[i], beside[j])) * (i != j)
-    length, strip = shapely.length(borders), np.zeros(len(every), dtype=bool)
-    # Where strips cross, what they share lies between strips.
-    for _ in range(2):
-        strip = thin & (np.bincount(i, along * (~thin | strip)[j], len(every)) > BETWEEN * length)
+    every = [*(face.ring for face in found.faces), *chain(*found.pieces.values())]
+    strip, across, are_joints = _strips(every, reach)
     if not strip.any():
         return []
-    half = length[strip] / 2.0
-    across = float(np.median(half - np.sqrt(np.maximum(half**2 - 4.0 * areas[strip], 0.0)))) / 2.0
-    x, y = every[int(strip.argmax())][1].mean(axis=0)
+    x, y = every[int(strip.argmax())].mean(axis=0)
     words = f"mortar: {counted(int(strip.sum()), 'strip')} {across:.3g} units wide between larger faces"
-    # Mortar parts the stones; between thin courses of tiles or slabs they touch each other.
-    beside_stones = np.bincount(i, along * ~strip[j], len(every))[~strip]
-    if strip.sum() < max(LEAST_STRIPS, MOSTLY * len(every)) or np.median(beside_stones) > 8.0 * reach:
+    if not are_joints:
         said = "count as blocks; if they are mortar, draw each joint as one line or leave them out (ignore)"
         return [Note(CHANGED, f"{words}, the first around ({x:.6g}, {y:.6g}), {said}")]
-    for k in np.flatnonzero(strip):
-        found.left_out.append(LeftOut("mortar", every[k][1], "the faces between pairs of lines are mortar"))
-    kept = [one for k, one in enumerate(every) if not strip[k]]
-    found.faces = [face for face, is_strip in zip(found.faces, strip, strict=False) if not is_strip]
-    found.pieces = {i: [ring for k, ring in kept if k == i] for i in found.pieces}
+    why = "the faces between pairs of lines are mortar"
+    found.left_out += [LeftOut("mortar", ring, why) for ring in compress(every, strip)]
+    # Faces take the first of these, the pieces of each outline the next.
+    is_stone = iter(~strip)
+    found.faces = [*compress(found.faces, is_stone)]
+    found.pieces = {i: [*compress(own, is_stone)] for i, own in found.pieces.items()}
     said = 'are taken for joints drawn as pairs of lines; joint_thickness = "auto" closes them, only = "*" keeps them'
     return [Note(CHANGED, f"{words} {said} as blocks")]
 
 
+def _strips(rings: Sequence[np.ndarray], reach: float) -> tuple[np.ndarray, float, bool]:
+    """(n,) bool array: which faces are strips between others; their width, and whether they are as many as joints."""
+    none = np.zeros(len(rings), dtype=bool), 0.0, False
+    if not rings:
+        return none
+    shapes = np.array([shapely.Polygon(ring) for ring in rings], dtype=object)
+    widths, areas = np.array([*map(ring_width, rings)]), shapely.area(shapes)
+    order = np.argsort(widths)
+    thin = widths < STRIP * widths[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())]
+    if not thin.any():
+        return none
+    i, j = shapely.STRtree(shapes).query(shapes, "dwithin", reach)
+    beside, borders = shapely.buffer(shapes, reach), shapely.get_exterior_ring(shapes)
+    along = shapely.length(shapely.intersection(borders[i], beside[j])) * (i != j)
+    length, strip = shapely.length(borders), none[0]
+    # Where strips cross, what they share lies between strips.
+    for _ in range(2):
+        strip = thin & (np.bincount(i, along * (~thin | strip)[j], len(rings)) > BETWEEN * length)
+    if not strip.any():
+        return none
+    half = length[strip] / 2.0
+    across = float(np.median(half - np.sqrt(np.maximum(half**2 - 4.0 * areas[strip], 0.0)))) / 2.0
+    # Mortar parts the stones; between thin courses of tiles or slabs they touch each other.
+    beside_stones = np.bincount(i, along * ~strip[j], len(rings))[~strip]
+    many = strip.sum() >= max(LEAST_STRIPS, MOSTLY * len(rings))
+    return strip, across, bool(many and not np.median(beside_stones) > 8.0 * reach)
+
+
 def _crossing_notes(
-    lines: Sequence[Line], segments: list[Any], borders: Sequence[set[int]], meets: float
+    lines: Sequence[Line], segments: np.ndarray, borders: Sequence[set[int]], meets: float
 ) -> list[Note]:
     """Say which layers have lines that run across those of others, as axes, ground lines and leaders, around faces."""
-    import shapely
-
     layers = np.array([line.layer for line in lines])
     main = Counter(layers[k] for border in borders for k in border).most_common(1)
     i, j = shapely.STRtree(segments).query(segments, "crosses")
     i, j = np.array([i, j])[:, (layers[i] != layers[j]) & (layers[i] != (main[0][0] if main else ""))]
-    one, other = np.array(segments, dtype=object)[i], np.array(segments, dtype=object)[j]
+    one, other = segments[i], segments[j]
     # A joint that ends at another may pass it by a little.
     ends = np.array([shapely.get_point(line, k) for line in (one, other) for k in (0, -1)])
     through = (shapely.distance(ends, shapely.intersection(one, other)) > meets).all(axis=0)
@@ -256,7 +267,7 @@ def _crossing_notes(
 
 def refuse_open(found: Drawing, what: str, remedy: str, unit: str, factors: Sequence[float] = (1, 1)) -> None:
     """Refuse a drawing that has nothing but lines that close nothing, and say what it has."""
-    if found.is_open:
+    if not found.outlines and all(item.kind == "open" for item in found.left_out):
         skipped = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items() if n)
         notes = [note for note in found.notes if kind_of(note) == LEFT_OUT]
         seen = "; ".join(words for words in (_nothing_closed(found.left_out), skipped, *notes) if words) or "nothing"
@@ -271,11 +282,9 @@ def _nothing_closed(left_out: Sequence[LeftOut]) -> str:
         return ""
     layers = Counter(item.layer for item in lines)
     listed = ", ".join(f"{n} on layer '{layer}'" if layer else f"{n}" for layer, n in layers.most_common(6))
-    ends = np.array([item.points[k] for item in lines for k in (0, -1)])
+    ends = ends_of(item.points for item in lines)
     words = f"{counted(len(lines), 'line closes', 'lines close')} nothing ({listed})"
     if len(lines) > 1:
-        from scipy.spatial import cKDTree
-
         # The ends of one line are neighbours in this list; the nearest end of another line is the second or third.
         distance, near = cKDTree(ends).query(ends, k=min(4, len(ends)))
         other = near // 2 != np.arange(len(ends))[:, None] // 2
@@ -288,26 +297,21 @@ def _nothing_closed(left_out: Sequence[LeftOut]) -> str:
 
 def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: float, found: Faces) -> list[np.ndarray]:
     """Let the ends of the first n lines meet what they miss by little, and be corners of every line that they meet."""
-    import shapely
-
     # An end on a curve hangs between it and its chord: the curve gets a corner there.
     curves = {j: off for j, off in enumerate(offs) if off > 0.0}
     flat = _with_corners(flat, n, curves, MEETS * size, MEETS * size)
-    others = [shapely.LineString(points) for points in flat]
+    others = _lines(flat)
     tree = shapely.STRtree(others)
-    ends = [(k, e) for k in range(n) for e in (0, -1)]
-    which, other = tree.query(shapely.points(np.array([flat[k][e] for k, e in ends])), "intersects")
-    own = np.array([k for k, _ in ends])
-    meeting = set(which[other != own[which]].tolist())
+    which, other = tree.query(shapely.points(ends_of(flat[:n])), "intersects")
+    meeting = which[other != which // 2]
     moved = []
-    for number, (k, e) in enumerate(ends):
-        if number in meeting:
-            continue
+    for number in np.setdiff1d(np.arange(2 * n), meeting).tolist():
+        k, e = number // 2, -(number % 2)
         end = flat[k][e]
         reach = min(MEETS * size, SHORTENED * float(shapely.length(others[k])))
-        near = [int(j) for j in tree.query(shapely.Point(end), "dwithin", MEETS * size) if j != k]
         # A line that has moved is taken where it is now.
-        best, distance, j = _nearest({j: shapely.LineString(flat[j]) for j in near}, end, reach)
+        near = tree.query(shapely.Point(end), "dwithin", MEETS * size).tolist()
+        best, distance, j = _nearest({j: shapely.LineString(flat[j]) for j in near if j != k}, end, reach)
         if distance < reach and distance > 0.0:
             flat[k][e] = best
             # An end of that line may move, too.
@@ -326,11 +330,8 @@ def _with_corners(
     drawn: Sequence[np.ndarray], n: int, offs: dict[int, float], meets: float, apart: float
 ) -> list[np.ndarray]:
     """Make the ends of the first n lines corners of the others that they meet, but for those near a corner."""
-    import shapely
-
     lines = [points.copy() for points in drawn]
-    ends = np.array([lines[k][e] for k in range(n) for e in (0, -1)])
-    near = np.array([shapely.LineString(lines[j]) for j in offs], dtype=object)
+    ends, near = ends_of(lines[:n]), _lines(lines[j] for j in offs)
     reach = np.array([*offs.values()]) + meets
     which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", reach)
     for j, i in zip(np.array([*offs], dtype=int)[which].tolist(), number.tolist(), strict=True):
@@ -360,8 +361,6 @@ def _is_on_curve(points: np.ndarray, end: np.ndarray, off: float, meets: float) 
 
 def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarray:
     """Make an end a corner of a line between its own ends, but for one near a corner."""
-    import shapely
-
     if np.hypot(*(points - end).T).min() <= apart:
         return points
     along = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
@@ -372,8 +371,6 @@ def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarra
 
 def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float, int]:
     """Find the place on lines to which an end belongs, its distance and the line; corners of a line come first."""
-    import shapely
-
     best, distance, found = end, reach, -1
     for j, line in lines.items():
         corners = np.array(line.coords)
@@ -391,8 +388,6 @@ def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.n
 
 def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[np.ndarray]:
     """Pieces of an outline around inner ones along its border, two or more; empty where the lines do not cut it."""
-    import shapely
-
     border = shapely.set_precision(area.exterior, grid)
     noded = shapely.union_all([border, *segments, *(one.exterior for one in inner)], grid_size=grid)
     faces = list(shapely.polygonize([*shapely.get_parts(noded)]).geoms)
@@ -406,27 +401,22 @@ def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[
 
 def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
     """Whether a line goes into an outline and out of it by more than a distance."""
-    import shapely
-
     into = shapely.intersects(lines, area.buffer(-reach))
     return bool((into & ~shapely.covers(area.buffer(reach), lines)).any())
 
 
 def _add_faces(
-    lines: list[Line], segments: list[Any], outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
+    lines: list[Line], segments: np.ndarray, outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
 ) -> None:
     """Add the faces between lines that cut no outline, and the lines that enclose nothing."""
-    import shapely
-
     if not lines:
         return
     grid, paths = GRID * size, {line.layer: line.within or (line.layer,) for line in lines}
     faces, cuts, dangles, _ = shapely.polygonize_full([shapely.union_all(segments, grid_size=grid)])
     loose = shapely.union_all([dangles, cuts]).buffer(2 * grid)
     shapely.prepare(loose)
-    for line, segment in zip(lines, segments, strict=True):
-        if shapely.covers(loose, segment):
-            found.left_out.append(line.left_out("open", _open_message(line), f"line {line.handle}"))
+    alone = [lines[k] for k in np.flatnonzero(shapely.covers(loose, segments))]
+    found.left_out += [line.left_out("open", _open_message(line), f"line {line.handle}") for line in alone]
     tree = shapely.STRtree(segments)
     drawn, borders = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines]), list[set[int]]()
     for face in faces.geoms:
@@ -437,18 +427,12 @@ def _add_faces(
         layer = max(sorted(set(nearest)), key=nearest.count)
         ring = _sharpened(ring, every, grid)
         if len(face.interiors):
-            x, y = np.array(face.interiors[0].coords).mean(axis=0)
-            message = (
-                f"the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
-                "or draw the blocks as closed outlines"
-            )
-            holes = tuple(np.array(inner.coords)[:-1] for inner in face.interiors)
-            found.left_out.append(LeftOut("hole", ring, message, layer, "face", holes=holes))
+            found.left_out.append(_with_a_hole(face, ring, layer))
             continue
         inner = face.buffer(-10 * grid)
-        over = [drawn.geometries[k] for k in drawn.query(inner, "intersects")]
+        over = drawn.geometries[drawn.query(inner, "intersects")]
         # Within an outline it may be a block in a frame: that is judged when all outlines are there.
-        if over and not all(outline.covers(inner) for outline in over):
+        if not shapely.covers(over, inner).all():
             message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
             found.left_out.append(LeftOut("across", ring, message, layer, "face"))
             continue
@@ -456,6 +440,16 @@ def _add_faces(
         found.faces.append(Face(ring, paths[layer], within))
         borders.append({*border})
     found.notes += _crossing_notes(lines, segments, borders, MEETS * size)
+
+
+def _with_a_hole(face: Any, ring: np.ndarray, layer: str) -> LeftOut:
+    x, y = np.array(face.interiors[0].coords).mean(axis=0)
+    message = (
+        f"the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
+        "or draw the blocks as closed outlines"
+    )
+    holes = tuple(np.array(inner.coords)[:-1] for inner in face.interiors)
+    return LeftOut("hole", ring, message, layer, "face", holes=holes)
 
 
 def _open_message(line: Line) -> str:

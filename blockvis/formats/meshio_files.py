@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,38 +26,35 @@ from .reading import Reading
 from .volumes import MESHIO_SOLIDS, Faces, bodies_of_cells
 
 
+@dataclass(frozen=True)
+class _Card:
+    """A card of an .inp file."""
+
+    word: str
+    parameters: str
+    data: str
+
+    @property
+    def set_name(self) -> str:
+        """Name of its set of cells, "" for none."""
+        found = re.search(r"(?i)\belset\s*=\s*\"?([^,\"]+)", self.parameters)
+        return found[1].strip() if found else ""
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """Members of a set, line by line: "Part-1-1.Stone 1" names that of an instance."""
+        lines = (line.split(",") for line in self.data.splitlines() if line.strip())
+        rows = ([word.strip().rpartition(".")[2].strip('"').upper() for word in line] for line in lines)
+        return [[word for word in row if word] for row in rows]
+
+
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a mesh through meshio; it states no unit."""
-    import meshio
-
     _check_text(path)
     suffix = path.suffix.lower()
     cards = _abaqus_cards(path) if suffix == ".inp" else []
     strange = passed_over(_strange_members(cards), "members of sets that are neither a cell nor a set before it")
-    said = io.StringIO()
-    try:
-        # meshio prints to the terminal, and raises SystemExit for some files.
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            if suffix in (".tec", ".dat"):
-                mesh = meshio.read(_Ending(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
-            elif cards:
-                mesh = meshio.read(io.StringIO(_mesh_alone(cards)), "abaqus")
-            elif suffix in (".bdf", ".fem", ".nas") and "BEGIN BULK" not in (text := path.read_text(errors="replace")):
-                # gmsh leaves out the line for which meshio waits.
-                mesh = meshio.read(io.StringIO(f"BEGIN BULK\n{text}"), "nastran")
-            else:
-                mesh = meshio.read(path)
-            sets = _abaqus_sets(cards, mesh.cells) if cards else {}
-    except (SystemExit, Exception) as error:  # noqa: BLE001
-        if isinstance(error, ModuleNotFoundError):
-            raise ValueError(f"it needs the package {error.name}: pip install {error.name}") from None
-        words = said.getvalue() if isinstance(error, SystemExit) else str(error)
-        name = type(error).__name__
-        reason = " ".join((f"{name} {words}" if isinstance(error, LookupError) else words or name).split())
-        raise ValueError(
-            f"it cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
-            "(order 1), or as .msh or .vtu"
-        ) from None
+    mesh, sets = _read_mesh(path, suffix, cards)
     if suffix == ".f3grid":
         mesh.cell_sets = _groups(mesh)
     points = np.asarray(mesh.points, dtype=float)
@@ -83,10 +81,40 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     return replace(found, notes=(*found.notes, *notes, *strange))
 
 
+def _read_mesh(path: Path, suffix: str, cards: Sequence[_Card]) -> tuple[Any, dict[str, np.ndarray]]:
+    """Have meshio read a file, of an .inp what meshio does not mix up; gives the sets of cells of that, too."""
+    import meshio
+
+    said = io.StringIO()
+    try:
+        # meshio prints to the terminal, and raises SystemExit for some files.
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            if suffix in (".tec", ".dat"):
+                mesh = meshio.read(_Ending(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
+            elif cards:
+                mesh = meshio.read(io.StringIO(_mesh_alone(cards)), "abaqus")
+            elif suffix in (".bdf", ".fem", ".nas") and "BEGIN BULK" not in (text := path.read_text(errors="replace")):
+                # gmsh leaves out the line for which meshio waits.
+                mesh = meshio.read(io.StringIO(f"BEGIN BULK\n{text}"), "nastran")
+            else:
+                mesh = meshio.read(path)
+            return mesh, _abaqus_sets(cards, mesh.cells) if cards else {}
+    except (SystemExit, Exception) as error:  # noqa: BLE001
+        if isinstance(error, ModuleNotFoundError):
+            raise ValueError(f"it needs the package {error.name}: pip install {error.name}") from None
+        words = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        name = type(error).__name__
+        reason = " ".join((f"{name} {words}" if isinstance(error, LookupError) else words or name).split())
+        raise ValueError(
+            f"it cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
+            "(order 1), or as .msh or .vtu"
+        ) from None
+
+
 def _groups(mesh: Any) -> dict[str, list[np.ndarray]]:
     """Take the groups of FLAC3D, which meshio calls "zone:NAME:SLOT", with numbers of cells in each block of cells."""
     # It numbers them through all blocks of cells.
-    starts = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    starts = _starts(mesh.cells)
     return {
         re.sub(r"^(zone|face):(.*):[^:]*$", r"\2", name): [
             part - start for part, start in zip(parts, starts[:-1], strict=True)
@@ -203,17 +231,17 @@ def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[st
     if not blocks:
         unused = f"the cell sets {listed(_names(by_size))} were not used: no choice of them holds every cell once"
         return {}, (Note(LEFT_OUT, unused),)
+    names, indices = zip(*blocks, strict=True)
     owner = np.zeros(total, dtype=np.int64)
-    for k, (_, index) in enumerate(blocks):
+    for k, index in enumerate(indices):
         owner[index] = k
-    groups, cutting = [(*names_of[index.tobytes()], "")[1] for _, index in blocks], []
+    groups, cutting = [(*names_of[index.tobytes()], "")[1] for index in indices], []
     for name, index in by_size:
         within, counts = np.unique(owner[index], return_counts=True)
         if (counts < np.bincount(owner)[within]).any():
             cutting.append((name, index))
         elif 1 < len(within) < len(blocks):
             groups = [group or (name if k in within else "") for k, group in enumerate(groups)]
-    names = [name for name, _ in blocks]
     unused = f"the cell sets {listed(_names(cutting))} were not used: they cut blocks"
     notes = (Note(LEFT_OUT, unused),) if cutting else ()
     return {CELL_SET: owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
@@ -233,17 +261,17 @@ def _names(sets: Sequence[tuple[str, np.ndarray]]) -> list[str]:
     return [f"'{name}'" for name, _ in sets]
 
 
-def _abaqus_cards(path: Path) -> list[tuple[str, str, str]]:
-    """Keyword, parameters and data of each card of an .inp file without comments; none where it includes others."""
+def _abaqus_cards(path: Path) -> list[_Card]:
+    """Read the cards of an .inp file without comments; none where it includes others."""
     text = re.sub(r"(?m)^\*\*.*\n?", "", path.read_text(encoding="utf-8", errors="replace"))
     cards = []
     for card in re.split(r"(?m)^[ \t]*\*", text)[1:]:
         head, _, data = card.partition("\n")
         word, _, parameters = head.partition(",")
-        cards.append((word.strip().upper(), parameters, data.rstrip()))
-    nodes = [number for word, _, data in cards if word == "NODE" for number in re.findall(r"(?m)^\s*(\d+)", data)]
-    words = [word for word, _, _ in cards]
-    moved = any(word in ("INSTANCE", "SYSTEM") and data for word, _, data in cards)
+        cards.append(_Card(word.strip().upper(), parameters, data.rstrip()))
+    nodes = [number for one in cards if one.word == "NODE" for number in re.findall(r"(?m)^\s*(\d+)", one.data)]
+    words = [one.word for one in cards]
+    moved = any(one.word in ("INSTANCE", "SYSTEM") and one.data for one in cards)
     if moved or words.count("INSTANCE") > 1 or len(set(nodes)) < len(nodes):
         raise ValueError(
             "it is written in parts with nodes of their own, or in a moved system; one list of nodes is read: "
@@ -252,75 +280,56 @@ def _abaqus_cards(path: Path) -> list[tuple[str, str, str]]:
     return [] if "INCLUDE" in words else cards
 
 
-def _set_name(parameters: str) -> str:
-    """Name of the set of cells of a card, "" for none."""
-    found = re.search(r"(?i)\belset\s*=\s*\"?([^,\"]+)", parameters)
-    return found[1].strip() if found else ""
-
-
-def _members(line: str) -> list[str]:
-    """Split a line of a set: "Part-1-1.Stone 1" names that of an instance."""
-    words = (word.strip().rpartition(".")[2].strip('"').upper() for word in line.split(","))
-    return [word for word in words if word]
-
-
-def _strange_members(cards: Sequence[tuple[str, str, str]]) -> Counter[str]:
+def _strange_members(cards: Sequence[_Card]) -> Counter[str]:
     """Count members of sets of cells that are neither a cell nor a set before it."""
     known: set[str] = set()
     strange: Counter[str] = Counter()
-    for word, parameters, data in cards:
-        if word not in ("ELEMENT", "ELSET"):
-            continue
-        members = [one for line in data.splitlines() for one in _members(line)] if word == "ELSET" else []
-        name = _set_name(parameters)
-        strange.update(f"'{one}' in '{name}'" for one in members if not one.isdigit() and one not in known)
-        known.add(name.upper())
+    for card in cards:
+        name = card.set_name
+        if card.word == "ELSET":
+            members = [one for one in chain(*card.rows) if not one.isdigit() and one not in known]
+            strange.update(f"'{one}' in '{name}'" for one in members)
+        if card.word in ("ELEMENT", "ELSET"):
+            known.add(name.upper())
     return strange
 
 
-def _mesh_alone(cards: Sequence[tuple[str, str, str]]) -> str:
+def _mesh_alone(cards: Sequence[_Card]) -> str:
     """Text of the nodes and cells of an .inp file; of several lists of nodes meshio keeps the last."""
-    nodes = [data for word, _, data in cards if word == "NODE"]
-    cells = [f"*ELEMENT,{parameters}\n{data}" for word, parameters, data in cards if word == "ELEMENT"]
+    nodes = [card.data for card in cards if card.word == "NODE"]
+    cells = [f"*ELEMENT,{card.parameters}\n{card.data}" for card in cards if card.word == "ELEMENT"]
     return "\n".join(["*NODE", *nodes, *cells, ""])
 
 
-def _abaqus_sets(cards: Sequence[tuple[str, str, str]], blocks: Sequence[Any]) -> dict[str, np.ndarray]:
+def _abaqus_sets(cards: Sequence[_Card], blocks: Sequence[Any]) -> dict[str, np.ndarray]:
     """Numbers of the cells of each ELSET; meshio mixes up those of several blocks of cells and those of other sets.
 
     The name of ``*ELSET`` is that of the same cells: programs number those of ``*ELEMENT``. Small and capital letters
     are the same to Abaqus; the first writing of a name is kept.
     """
-    named = [(word, _set_name(parameters), parameters, data)
-             for word, parameters, data in cards if word in ("ELEMENT", "ELSET")]  # fmt: skip
-    written: dict[str, str] = {}
-    for _, name, _, _ in named:
-        written.setdefault(name.upper(), name)
-    numbers: list[np.ndarray] = []
-    of_elements: dict[str, list[np.ndarray]] = {}
-    for (_, name, _, data), block in zip((one for one in named if one[0] == "ELEMENT"), blocks, strict=True):
-        cells = np.fromstring(data.replace(",", " "), dtype=np.int64, sep=" ")
+    named = [card for card in cards if card.word in ("ELEMENT", "ELSET")]
+    written = {card.set_name.upper(): card.set_name for card in reversed(named)}
+    elements, elsets = ([card for card in named if card.word == word] for word in ("ELEMENT", "ELSET"))
+    numbers, parts = list[np.ndarray](), defaultdict[str, list[np.ndarray]](list)
+    for card, block in zip(elements, blocks, strict=True):
+        cells = np.fromstring(card.data.replace(",", " "), dtype=np.int64, sep=" ")
         numbers.append(cells[:: max(1, len(cells) // max(1, len(block.data)))])
-        if name:
-            of_elements.setdefault(name.upper(), []).append(numbers[-1])
+        parts[card.set_name.upper()].append(numbers[-1])
     every = np.concatenate([*numbers, np.zeros(0, dtype=np.int64)])
-    sets: dict[str, list[np.ndarray]] = {}
-    for word, name, parameters, data in named:
-        if word == "ELEMENT" or not name:
-            continue
-        own = sets.setdefault(name.upper(), [])
-        rows = [_members(line) for line in data.splitlines() if line.strip()]
-        if re.search(r"(?i)\bgenerate\b", parameters):
-            ranges = [(int(row[0]), int(row[1]), int(row[2]) if len(row) > 2 else 1) for row in rows]
-            own += [every[(every >= a) & (every <= b) & ((every - a) % step == 0)] for a, b, step in ranges]
-        else:
-            words = [one for row in rows for one in row]
-            own.append(np.array([one for one in words if one.isdigit()], dtype=np.int64))
-            own += [part for one in words for part in (*sets.get(one, ()), *of_elements.get(one, ()))]
-    found = {}
-    for key in dict.fromkeys((*sets, *of_elements)):
-        members = np.concatenate([*sets.get(key, ()), *of_elements.get(key, ())])
-        found[key] = np.flatnonzero(np.isin(every, members))
-    named_twice = {found[key].tobytes() for key in sets}
-    kept = {key: index for key, index in found.items() if key in sets or index.tobytes() not in named_twice}
-    return {written[key]: index for key, index in kept.items()}
+    for card in elsets:
+        parts[card.set_name.upper()] += _parts_of(card, every, parts)
+    own = dict.fromkeys(card.set_name.upper() for card in elsets if card.set_name)
+    keys = dict.fromkeys([*own, *filter(None, parts)])
+    found = {key: np.flatnonzero(np.isin(every, np.concatenate(parts[key]))) for key in keys}
+    named_twice = {found[key].tobytes() for key in own}
+    return {written[key]: index for key, index in found.items() if key in own or index.tobytes() not in named_twice}
+
+
+def _parts_of(card: _Card, every: np.ndarray, known: Mapping[str, list[np.ndarray]]) -> list[np.ndarray]:
+    """Numbers of the cells of an ELSET, in parts: of ranges, by themselves, or those of sets that are known."""
+    if re.search(r"(?i)\bgenerate\b", card.parameters):
+        ranges = [(int(row[0]), int(row[1]), int(row[2]) if len(row) > 2 else 1) for row in card.rows]
+        return [every[(every >= a) & (every <= b) & ((every - a) % step == 0)] for a, b, step in ranges]
+    words = [*chain(*card.rows)]
+    own = np.array([one for one in words if one.isdigit()], dtype=np.int64)
+    return [own, *(part for one in words for part in known.get(one, ()))]

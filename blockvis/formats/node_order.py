@@ -38,12 +38,6 @@ VTK = {
     23: QUADRATIC_QUADRANGLE, 28: QUADRATIC_QUADRANGLE,
 }  # fmt: skip
 
-#: VTK's types of cell without area, which draw no block.
-VTK_LINES = (0, 1, 2, 3, 4, 21, 35, 51, 60, 68, 75)
-
-#: VTK's other types of cell with an area, which are not read.
-VTK_OTHER_FACES = (6, 30, 36, 52, 53, 54, 61, 62, 63, 69, 70, 76, 77)
-
 
 def ring_of_nodes(nodes: np.ndarray, order: tuple[int, ...] | None) -> np.ndarray:
     """Put the nodes (..., n_nodes) of cells of one type in order around each: an entry of a table above."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 
 from blockvis.layout.outlines import ring_area
 
@@ -141,8 +142,6 @@ def outlined(regions: Regions, tolerance: float = STAIRS) -> Outlined:
 
     Lines between two regions are traced once, so that both have the same corners.
     """
-    import shapely
-
     cracks = shapely.linestrings(_cracks(regions.numbers).astype(float))
     chains = shapely.get_parts(shapely.line_merge(shapely.multilinestrings(cracks)))
     drawn = _faces(chains, regions)
@@ -164,8 +163,6 @@ def outlined(regions: Regions, tolerance: float = STAIRS) -> Outlined:
 
 def _faces(chains: Any, regions: Regions) -> Any | None:
     """(n,) array of polygons: the face of each region between lines; None if lines of another course miss one."""
-    import shapely
-
     faces = shapely.orient_polygons(shapely.get_parts(shapely.polygonize(chains)))
     inside = shapely.get_coordinates(shapely.point_on_surface(faces))
     height, width = regions.numbers.shape
@@ -195,8 +192,6 @@ def _cracks(numbers: np.ndarray) -> np.ndarray:
 
 def _without_stairs(chains: Any, tolerance: float) -> Any:
     """Simplify staircases to the lines they stand for; those that would then cross another keep their corners."""
-    import shapely
-
     lines = [_cut(shapely.get_coordinates(chain)) for chain in chains]
     cut = shapely.linestrings(np.concatenate(lines), indices=np.repeat(np.arange(len(lines)), [*map(len, lines)]))
     # Chords cut some off round stones: of small ones it would be felt.

@@ -11,11 +11,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
 from xml.sax.saxutils import unescape
 
 import numpy as np
+import pyvista
+from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
@@ -25,16 +27,17 @@ from solver.mechanics import counted
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
 from .cells import flat_beside, layout_of_cells, merged, owners, rows_of_cells
-from .node_order import VTK, VTK_LINES, VTK_OTHER_FACES, ring_of_nodes
+from .node_order import VTK, ring_of_nodes
 from .reading import DEEPEST, Reading, naming
 from .volumes import VTK_SOLIDS, bodies_of_cells
 from .vtk_arrays import announced_bytes, largest_number
 
-if TYPE_CHECKING:
-    import pyvista
-
 #: VTK's type of cell with a volume that lists its faces, which do not follow from the type.
-POLYHEDRON = 42
+POLYHEDRON = pyvista.CellType.POLYHEDRON
+
+#: VTK's types of cell with an area, of which some are read, and those with none, which draw no block.
+FACES = tuple(kind for kind in pyvista.CellType if kind.dimension == 2)
+LINES = tuple(kind for kind in pyvista.CellType if kind.dimension < 2)
 
 #: The cell array by which files of an increment say which blocks have left for good.
 GONE = "fallen"
@@ -48,8 +51,6 @@ MOST_NUMBERS = 50_000_000
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file of VTK, which states no unit."""
-    import pyvista
-
     _check_counts(path)
     if path.suffix.lower() in (".pvd", ".vtm", ".vtmb"):
         _check_parts(path)
@@ -224,8 +225,6 @@ def layout_of_dataset(data: Any, dimension: int | None = None) -> Layout:
 
 def found_in_dataset(data: Any, view: str | None) -> Layout | Bodies:
     """Read the blocks of a pyvista dataset, flat or in space."""
-    import pyvista
-
     if isinstance(data, pyvista.MultiBlock):
         return _found_in_parts(data, view)
     grid = _as_cells(data)
@@ -240,7 +239,7 @@ def found_in_dataset(data: Any, view: str | None) -> Layout | Bodies:
     if solid.any():
         found: Layout | Bodies = _bodies_of_solids(grid, ~gone)
         points_of = np.split(connectivity, offset[1:-1])
-        faces = np.isin(types, [*VTK, *VTK_OTHER_FACES])
+        faces = np.isin(types, FACES)
         flat = [points_of[k] for k in np.flatnonzero(faces & ~gone)]
         notes += flat_beside([points_of[k] for k in np.flatnonzero(solid)], flat)
         notes += _unread(types[~gone & ~solid & ~faces])
@@ -258,10 +257,8 @@ def found_in_dataset(data: Any, view: str | None) -> Layout | Bodies:
 
 def _unread(types: np.ndarray) -> tuple[str, ...]:
     """Count in a note the cells of types that are not read, but for lines and points, which draw no block."""
-    import pyvista
-
     names = {int(kind): kind.name.lower().replace("_", " ") for kind in pyvista.CellType}
-    counts = Counter(names.get(kind, f"type {kind}") for kind in types.tolist() if kind not in VTK_LINES)
+    counts = Counter(names.get(kind, f"type {kind}") for kind in types.tolist() if kind not in LINES)
     if not counts:
         return ()
     listed = ", ".join(f"{n} {kind}" for kind, n in counts.items())
@@ -278,8 +275,6 @@ def _gone(grid: Any) -> np.ndarray:
 
 def _found_in_parts(data: Any, view: str | None) -> Layout | Bodies:
     """Read the parts of a multiblock; those that hold no blocks, such as centres and contact points, are left out."""
-    import pyvista
-
     flat: list[tuple[Layout | Bodies, str]] = []
     solid: list[tuple[Layout | Bodies, str]] = []
     left_out = []
@@ -303,8 +298,6 @@ def _found_in_parts(data: Any, view: str | None) -> Layout | Bodies:
 
 
 def _has_blocks(part: Any) -> bool:
-    import pyvista
-
     if isinstance(part, pyvista.MultiBlock):
         return any(one is not None and _has_blocks(one) for one in part)
     types = np.asarray(part.cast_to_unstructured_grid().celltypes) if part.n_cells else np.zeros(0)
@@ -312,8 +305,6 @@ def _has_blocks(part: Any) -> bool:
 
 
 def _as_cells(data: Any) -> pyvista.UnstructuredGrid:
-    import pyvista
-
     if not isinstance(data, pyvista.DataSet) or data.n_cells == 0:
         raise ValueError("it has no cells; save the blocks as polygons or a meshed surface")
     if isinstance(data, pyvista.UnstructuredGrid):
@@ -367,7 +358,6 @@ def _faceted_bodies(
     grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, rows: list[dict[str, Any]]
 ) -> list[Body]:
     """Find the bodies of polyhedra, which list their faces."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
 
     def lists(array: Any) -> tuple[np.ndarray, np.ndarray]:
         return vtk_to_numpy(array.GetOffsetsArray()), vtk_to_numpy(array.GetConnectivityArray())
@@ -396,8 +386,6 @@ def _within(numbers: np.ndarray, end: int) -> bool:
 
 def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
     """Make a dataset of a cell per block, polygon or polyhedron, with the cell arrays that the reader understands."""
-    import pyvista
-
     cells, start = list[int](), 0
     for block in layout.blocks:
         points, faces = block if isinstance(block, tuple) else (block, [])
@@ -433,8 +421,6 @@ def write(layout: Layout, path: Path) -> None:
 
 
 def _surface(grid: Any) -> pyvista.PolyData:
-    import pyvista
-
     surface = pyvista.PolyData(np.asarray(grid.points), faces=np.asarray(grid.cells))
     for key in grid.cell_data:
         surface.GetCellData().AddArray(grid.GetCellData().GetAbstractArray(key))

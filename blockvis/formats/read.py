@@ -190,7 +190,7 @@ def _outlines(path: Path, reading: Reading) -> Layout:
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     with naming(f"'{path}'"):
-        content = found[0] if files == [path] else of_files([_apart(one) for one in found], files)
+        content = found[0] if files == [path] else of_files(found, files)
         with carrying(lambda: as_drawn(content)):
             if isinstance(content, Layout) and content.dimension == 3 and reading.dimension == 2:
                 raise ValueError("it draws its blocks in space; leave out dimension = 2")
@@ -208,13 +208,6 @@ def _outlines(path: Path, reading: Reading) -> Layout:
                 "coordinates must be finite numbers: repair the file"
             )
     return _in_metres(layout, unit)
-
-
-def _apart(content: Layout | Bodies) -> Layout | Bodies:
-    """Refuse layouts in space as files of one stone each: they hold all blocks."""
-    if isinstance(content, Layout) and content.dimension == 3:
-        raise ValueError("it stands for layouts of blocks in space; give one of them")
-    return content
 
 
 def _in_metres(layout: Layout, unit: str | None) -> Layout:
@@ -276,14 +269,18 @@ def write_layout(layout: Layout, path: str | Path) -> None:
         raise TypeError(f"{type(layout).__name__} is no Layout, as read_layout gives; save_layout writes an Assembly")
     if layout.n_blocks == 0:
         raise ValueError(f"there is no block to write to '{path}'")
-    _write_by_suffix(layout, Path(path))
-    suffix = Path(path).suffix.lower()
-    lost = _beside_shapes(layout) if FORMATS[suffix].shapes_only else ""
+    path = Path(path)
+    known, module = _format(path, "write")
+    if layout.dimension == 3 and not known.writes_space:
+        able = " ".join(sorted(suffix for suffix, other in FORMATS.items() if other.writes_space))
+        raise ValueError(f"'{path}': {path.suffix} holds no blocks in space; use one of {able}")
+    # Whole or not at all.
+    with atomic_file(path) as partial:
+        module.write(layout, partial)
+    lost = _beside_shapes(layout) if known.shapes_only else ""
     if lost:
-        warnings.warn(
-            f"'{path}': {suffix} holds shapes and names alone, not the {lost}; write .obj or .json to keep them",
-            stacklevel=2,
-        )
+        alone = f"{path.suffix.lower()} holds shapes and names alone, not the {lost}"
+        warnings.warn(f"'{path}': {alone}; write .obj or .json to keep them", stacklevel=2)
 
 
 def _beside_shapes(layout: Layout) -> str:
@@ -458,16 +455,6 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
             reading.refuse_image_keys()
         found: Layout | Bodies = module.read(path, reading)
     return found
-
-
-def _write_by_suffix(layout: Layout, path: Path) -> None:
-    """Write a file, whole or not at all, with the module of its suffix."""
-    known, module = _format(path, "write")
-    if layout.dimension == 3 and not known.writes_space:
-        able = " ".join(sorted(suffix for suffix, other in FORMATS.items() if other.writes_space))
-        raise ValueError(f"'{path}': {path.suffix} holds no blocks in space; use one of {able}")
-    with atomic_file(path) as partial:
-        module.write(layout, partial)
 
 
 def _format(path: Path, verb: str) -> tuple[Format, Any]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout, solids_of
@@ -23,7 +24,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from . import dae
-from .bodies import Bodies, Body, drawn_row, with_role
+from .bodies import Bodies, Body, body_of_polygons, drawn_row, with_role
 from .cells import layout_of_cells, merged
 from .closed_surfaces import OpenSurface, enclosed
 from .reading import Reading, json_object, parsing
@@ -109,9 +110,30 @@ def _obj(path: Path) -> Bodies:
     text = _obj_text(path)
     there = re.findall(r"^[ \t]*(o|g|usemtl)[ \t]", text, re.MULTILINE)
     word = next((word for word in _WORDS if word in there), "o")
-    said, points, objects = dict.fromkeys(_WORDS, ""), list[list[float]](), dict[str, _Object]()
     # What is said once, before the first object, is said for all.
     of_all = {key for key in there[: there.index(word)] if there.count(key) == 1} if there else set[str]()
+    points, objects = _obj_objects(text, word, of_all, path.name)
+    parts = []
+    for name, one in objects.items():
+        outside = next((k for face in one.faces for k in face if not 0 <= k < len(points)), None)
+        if outside is not None:
+            raise ValueError(
+                f"a face of '{name}' uses point {outside + 1}, but there are {len(points)}; export it again"
+            )
+        parts.append(body_of_polygons(name, points, one.faces, one.row(name, word)))
+    parts = [part for part in parts if len(part.faces)]
+    rows = _own_rows(path)
+    if word == "o" and _distinct(rows) == [part.name for part in parts]:
+        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
+    return Bodies(parts, grouped=word != "o", notes=_inherited(objects))
+
+
+def _obj_objects(text: str, word: str, of_all: set[str], unnamed: str) -> tuple[np.ndarray, dict[str, _Object]]:
+    """(n, 3) array: the points of an .obj file; and its objects, which a word names, before the first ``unnamed``.
+
+    Words that are ``of_all`` are said for each of them.
+    """
+    said, points, objects = dict.fromkeys(_WORDS, ""), list[list[float]](), dict[str, _Object]()
     since_name, since_face = set[str](), set[str]()
     for line in text.split("\n"):
         first, *rest = line.split() or [""]
@@ -129,7 +151,7 @@ def _obj(path: Path) -> Bodies:
                 points.append([float(x), float(y), float(z)])
             elif first == "f":
                 numbers = [int(corner.split("/")[0]) for corner in rest]
-                one = objects.setdefault(said[word] or path.name, _Object())
+                one = objects.setdefault(said[word] or unnamed, _Object())
                 # Negative numbers count back from the last point before the line.
                 one.faces.append([k - 1 if k > 0 else len(points) + k for k in numbers])
                 one.own |= since_name
@@ -138,20 +160,7 @@ def _obj(path: Path) -> Bodies:
                 since_face.clear()
         except ValueError:
             raise ValueError(f"it cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
-    every, parts = np.array(points).reshape(-1, 3), []
-    for name, one in objects.items():
-        outside = next((k for face in one.faces for k in face if not 0 <= k < len(points)), None)
-        if outside is not None:
-            raise ValueError(
-                f"a face of '{name}' uses point {outside + 1}, but there are {len(points)}; export it again"
-            )
-        own, triangles = np.unique(fans(one.faces), return_inverse=True)
-        if len(own):
-            parts.append(Body(name, every[own], triangles.reshape(-1, 3), one.row(name, word)))
-    rows = _own_rows(path)
-    if word == "o" and _distinct(rows) == [part.name for part in parts]:
-        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
-    return Bodies(parts, grouped=word != "o", notes=_inherited(objects))
+    return np.array(points).reshape(-1, 3), objects
 
 
 def _off(path: Path) -> Bodies:
@@ -294,8 +303,6 @@ def _stand_along_y(bodies: Sequence[Body], size: float) -> str:
 
 def _standing(bodies: Sequence[Body], axis: int, size: float) -> int:
     """Count the bodies with a face in the lowest level along an axis; 0 if the middle of all is not above them."""
-    import shapely
-
     # The pieces of one mesh share its points.
     corners = [body.points[np.unique(body.faces)] for body in bodies]
     lowest = min(float(points[:, axis].min()) for points in corners)
@@ -324,18 +331,7 @@ def _nodes(path: Path) -> Bodies:
     # Called by their numbers: trimesh changes names that are there several times.
     called = {"nodes": [{**node, "name": str(k)} for k, node in enumerate(nodes)]} if nodes else {}
     scene = trimesh.load_scene(_with_description(path, described | called), file_type="glb", process=False)
-    order, found = {name: k for k, name in enumerate(scene.geometry)}, dict[int, list[Any]]()
-    placed = []
-    for frame in scene.graph.nodes_geometry:
-        transform, name = scene.graph[frame]
-        # Of a mesh in several parts each has a frame that is called after the node, and more.
-        placed.append((order[name], int(frame.partition("_")[0]), transform))
-    for k, node, transform in sorted(placed, key=lambda one: one[:2]):
-        mesh = scene.geometry[[*order][k]]
-        if len(getattr(mesh, "faces", ())):
-            # Without its textures.
-            shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).apply_transform(transform)
-            found.setdefault(node, []).append(shape)
+    found = _shapes_at_nodes(scene)
     drawn = [(nodes[k], meshes[nodes[k]["mesh"]]) for k in found]
     names = [str(node.get("name") or mesh.get("name") or path.name) for node, mesh in drawn]
     parts = [_body(name, shapes) for name, shapes in zip(names, found.values(), strict=True)]
@@ -346,6 +342,24 @@ def _nodes(path: Path) -> Bodies:
         materials = [_materials(mesh, described.get("materials", [])) for _, mesh in drawn]
         parts = dae.said_below(parts, _around([*found], nodes), materials)
     return Bodies(parts, "m", up="y")
+
+
+def _shapes_at_nodes(scene: Any) -> dict[int, list[Any]]:
+    """Meshes of a scene where they are placed, without textures, by the numbers after which nodes are called."""
+    import trimesh
+
+    order, placed = {name: k for k, name in enumerate(scene.geometry)}, []
+    for frame in scene.graph.nodes_geometry:
+        transform, name = scene.graph[frame]
+        # Of a mesh in several parts each has a frame that is called after the node, and more.
+        placed.append((order[name], int(frame.partition("_")[0]), name, transform))
+    found = dict[int, list[Any]]()
+    for _, node, name, transform in sorted(placed, key=lambda one: one[:2]):
+        mesh = scene.geometry[name]
+        if len(getattr(mesh, "faces", ())):
+            shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).apply_transform(transform)
+            found.setdefault(node, []).append(shape)
+    return found
 
 
 def _with_description(path: Path, described: dict[str, Any]) -> BytesIO:

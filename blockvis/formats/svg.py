@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
+from PIL import ImageColor
 
 from blockvis.layout.block_table import layer_of, layers_of, on_layer, rows_of
 from blockvis.layout.layout import Layout
@@ -130,6 +131,11 @@ class _Context:
         chain = is_chain([float(number) for number in (numbers * 2 if len(numbers) % 2 else numbers)[::2]])
         return "dashes and dots" if chain else "dashes" if numbers else "", chain
 
+    def within(self, element: ElementTree.Element, matrix: np.ndarray) -> _Context:
+        """Context of what an element holds, painted as that says or else as what is around it."""
+        painting = {key: _style(element, key) or value for key, value in self.painting.items()}
+        return replace(self, matrix=matrix, depth=self.depth + 1, painting=painting)
+
     @property
     def layer(self) -> str:
         """The innermost layer, "" for none."""
@@ -155,7 +161,7 @@ def read(path: Path, reading: Reading) -> Layout:
     # What sheets that are not read say may paint a shape.
     found.sheets_missed = len(styled) > 0
     _walk(root, _Context(np.eye(3), (), tolerance), found)
-    with_faces(found, reading, called=lambda name, k: f"{name} {k + 1}", row_of=_row, tolerance=tolerance)
+    with_faces(found, reading, row_of=_row, tolerance=tolerance)
     refuse_open(found, "closed shape", "a closed path or polygon", stated, factors=(1.0, -1.0))
     found.notes += passed_over(found.skipped)
     found.notes += passed_over(found.clipped, "read whole, not clipped")
@@ -233,23 +239,18 @@ def _styled(root: ElementTree.Element) -> list[str]:
     rules = []
     for rule in _AT_RULE.sub("", sheets).split("}"):
         selectors, _, said = rule.rpartition("{")
-        for selector in selectors.split(","):
-            match = _SELECTOR.fullmatch(selector.strip())
-            if match is not None and selector.strip():
-                marks = re.findall(r"[.#][\w-]+", match[2])
-                ids = {mark[1:] for mark in marks if mark[0] == "#"}
-                classes = {mark[1:] for mark in marks if mark[0] == "."}
-                tag = match[1] or "*"
-                rules.append(((len(ids), len(classes), tag != "*"), tag, ids, classes, said))
+        for selector in map(str.strip, selectors.split(",")):
+            match = _SELECTOR.fullmatch(selector)
+            if match is not None and selector:
+                # Ids and classes are kept with their signs.
+                marks, ids, tag = re.findall(r"[.#][\w-]+", match[2]), match[2].count("#"), match[1] or "*"
+                rules.append(((ids, len(marks) - ids, tag != "*"), tag, {*marks}, said))
             elif _READ.search(said):
-                missed.append(selector.strip())
+                missed.append(selector)
     rules.sort(key=lambda rule: rule[0])
     for element in root.iter() if rules else ():
-        own, called = set(element.get("class", "").split()), {element.get("id", "")}
-        applied = [
-            text for _, tag, ids, classes, text in rules
-            if tag in ("*", _tag(element)) and ids <= called and classes <= own
-        ]  # fmt: skip
+        own = {f".{word}" for word in element.get("class", "").split()} | {f"#{element.get('id', '')}"}
+        applied = [text for _, tag, marks, text in rules if tag in ("*", _tag(element)) and marks <= own]
         if applied:
             element.set("style", ";".join([*applied, element.get("style", "")]))
     return [
@@ -303,21 +304,16 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
         except ValueError as error:
             found.notes.append(Note(LEFT_OUT, f"an inner {_called(element)} was skipped: it {error}"))
             return
-    painting = {key: _style(element, key) or value for key, value in where.painting.items()}
-    where = replace(where, matrix=matrix, depth=where.depth + 1, painting=painting)
+    where = where.within(element, matrix)
     if tag == "g":
         where = _in_group(element, where)
-    shape = _SHAPES.get(tag)
     found.clipped.update(f"<{tag}> with a {key}" for key in ("clip-path", "mask") if "url(" in _style(element, key))
-    unpainted = not (where.fills or where.strokes or found.sheets_missed)
-    if shape is not None and (painting["visibility"] != "visible" or unpainted):
-        found.skipped[f"hidden <{tag}>"] += 1
-    elif shape is not None:
-        try:
-            parts = shape(element, where)
-        except (ValueError, OverflowError) as error:
-            raise ValueError(f"{_called(element)} {error}") from None
-        _add(element, parts, where, found)
+    if tag in _SHAPES:
+        unpainted = not (where.fills or where.strokes or found.sheets_missed)
+        if where.painting["visibility"] != "visible" or unpainted:
+            found.skipped[f"hidden <{tag}>"] += 1
+        else:
+            _add(element, where, found)
     for child in shown:
         _walk(child, where, found)
 
@@ -355,7 +351,11 @@ def _called(element: ElementTree.Element) -> str:
     return f"<{_tag(element)}> '{element.get('id', 'without id')}'"
 
 
-def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, found: _Found) -> None:
+def _add(element: ElementTree.Element, where: _Context, found: _Found) -> None:
+    try:
+        parts = _SHAPES[_tag(element)](element, where)
+    except (ValueError, OverflowError) as error:
+        raise ValueError(f"{_called(element)} {error}") from None
     title = next((child.text or "" for child in element if _tag(child) == "title"), "")
     name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
     kept = _kept(element, title, where, found)
@@ -415,8 +415,6 @@ def _transform(element: ElementTree.Element) -> str:
 
 def _colour(where: _Context) -> tuple[str, ...]:
     """Give the colour of a shape as #rrggbb, that of its fill or else of its stroke; none where it has none."""
-    from PIL import ImageColor
-
     word = where.painting["fill" if where.fills else "stroke"]
     try:
         return ("#{:02x}{:02x}{:02x}".format(*ImageColor.getrgb(word)[:3]),)

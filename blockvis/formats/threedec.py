@@ -86,6 +86,10 @@ class _Block:
         """(3,) array: of the box around it."""
         return np.asarray((self.points.min(axis=0) + self.points.max(axis=0)) / 2.0)
 
+    def is_of(self, kind: str, word: str) -> bool:
+        """Whether it is of a group, or of a region."""
+        return word in self.groups if kind == "group" else self.words.get("region") == word
+
 
 @dataclass
 class _Model:
@@ -287,23 +291,21 @@ def _in_range(words: list[str], model: _Model) -> list[_Block]:
 
     None either where blocks are hidden: commands may pass these over.
     """
-    small = [word.lower() for word in words if word.lower() not in ("range", "and")]
-    words = [_plain(word) for word in words if word.lower() not in ("range", "and")]
+    said = [word for word in words if word.lower() not in ("range", "and")]
+    small, words = [*map(str.lower, said)], [*map(_plain, said)]
     regions = {name.lower(): region for region, name in model.names.items()}
     chosen, k = [] if model.passed["hide"] + model.passed["block hide"] else model.blocks, 0
     while k < len(words):
         key = small[k].removeprefix("position-").removeprefix("pos-")
         after = words[k + 1 : k + 3]
-        if key == "region" and after:
-            chosen, k = [block for block in chosen if block.words.get(key) == after[0]], k + 2
-        elif key == "group" and after:
-            chosen, k = [block for block in chosen if after[0] in block.groups], k + 2
+        if key in ("region", "group") and after:
+            chosen, k = [block for block in chosen if block.is_of(key, after[0])], k + 2
         elif key in ("x", "y", "z") and len(after) == 2 and None not in (limits := [_number(word) for word in after]):
             low, high = (number for number in limits if number is not None)
             axis = "xyz".index(key)
             chosen, k = [block for block in chosen if low <= block.middle[axis] <= high], k + 3
         elif _plain(key) in regions:
-            chosen, k = [block for block in chosen if block.words.get("region") == regions[_plain(key)]], k + 1
+            chosen, k = [block for block in chosen if block.is_of("region", regions[_plain(key)])], k + 1
         else:
             return []
     return chosen

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import shapely
@@ -165,14 +166,12 @@ def _tried(top: Top, kind: str, near: float, units: Units) -> Iterator[tuple[str
             for depth in DEPTHS:
                 reach, deep = min(bearing * units.bearing, near / 2.0), depth * units.depth_of_ring(top.span)
                 yield "voussoir", _relief(top, reach, deep, units)
+    reaches = [min(bearing * units.bearing, near / 2.0) for bearing in BEARINGS]
     for depth in DEPTHS:
-        for bearing in BEARINGS:
-            reach = min(bearing * units.bearing, near / 2.0)
+        for reach in reaches:
             yield "lintel", [_lintel(top, (reach, reach), depth, units)]
-    for left in BEARINGS:
-        for right in BEARINGS:
-            reaches = (min(left * units.bearing, near / 2.0), min(right * units.bearing, near / 2.0))
-            yield "lintel", [_lintel(top, reaches, DEPTHS[-1], units)]
+    for left, right in product(reaches, reaches):
+        yield "lintel", [_lintel(top, (left, right), DEPTHS[-1], units)]
 
 
 def _lintel(top: Top, bearings: tuple[float, float], share: float, units: Units) -> shapely.Polygon:

@@ -16,6 +16,7 @@ from blockvis.cases.build import case_interfaces
 from blockvis.cases.contents import Case
 from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
+from blockvis.formats.reading import naming
 from blockvis.results.about import phases_of
 from solver import mechanics
 from solver.mechanics import counted
@@ -189,9 +190,7 @@ def needs_live_load(case: Case) -> None:
 def needs_no_crushing(case: Case, when: str = "") -> None:
     """Raise ValueError where a joint of a case has a compressive strength, which no path follows, or too much else."""
     interfaces = case_interfaces(case)
-    try:
+    with naming(str(case.source)):
         interfaces.refuse_crushing(f"a {case.analysis}{when}")
         if case.controls.increments == mechanics.INCREMENTS[1]:
             interfaces.refuse_mortar(f'[analysis] increments = "{case.controls.increments}"')
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None

@@ -15,6 +15,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
+from blockvis.formats.reading import naming
 from blockvis.results.about import (
     after_settlements,
     collapse_phase,
@@ -47,8 +48,7 @@ FLOWS = ("associative", "non-associative")
 #: What faces of blocks in space resist when they turn in their own plane.
 TORSIONS = ("points", "uniform")
 
-#: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
-#: structure.
+#: Frames in which the mechanism of a limit load is swung.
 SWINGING_FRAMES = 30
 
 #: Displacement within which joints that a settlement has opened may close, in mean heights of the free blocks, which do
@@ -151,11 +151,9 @@ class LimitLoadKind(AnalysisKind):
             return case
         if not case.settlements or any(load.positions for load in case.loads):
             raise _capacity_at_without_settlement(case)
-        try:
+        with naming(f"{case.source}: [analysis] capacity_at"):
             # Some settlement has to reach each of them.
             replace(max(case.settlements, key=lambda settlement: settlement.limit), stops=settings.capacity_at)
-        except ValueError as error:
-            raise ValueError(f"{case.source}: [analysis] capacity_at: {error}") from None
         reached = [[s for s in settings.capacity_at if s <= phase.limit] for phase in case.settlements]
         stopping = [replace(phase, stops=stops) for phase, stops in zip(case.settlements, reached, strict=True)]
         return replace(case, settlements=tuple(stopping))
@@ -285,10 +283,7 @@ class LimitLoadKind(AnalysisKind):
             lines.append(f"after a settlement of{state.parameter:12.6g} {place}{drawn}")
         lines += filter(None, [after_settlements(response)])
         lines += [f"note: {note}" for note in _notes_on_places(response)]
-        if response.collapse is not None:
-            lines.append(response.message)
-        else:
-            lines.append(f"mechanism: {said['mechanism']}")
+        lines.append(response.message if response.collapse is not None else f"mechanism: {said['mechanism']}")
         if (mass := said.get("effective_mass_share")) is not None:
             spectral = f"a spectral acceleration of {said['spectral_acceleration']:.6g} g"
             lines.append(f"effective mass       {mass:12.6g}     of what moves: {spectral}")
@@ -549,8 +544,8 @@ def _over_places(
     assert shown is not None
     yield from _swinging(run.given.assembly, shown)
     ending = _limit_ending(run.limits[chosen])
-    failed = [limit.status is solver.LimitStatus.NOT_CONVERGED for limit in run.limits]
-    note = _unconverged([float(x) for x, lacks in zip(places, failed, strict=False) if lacks], len(places))
+    pairs = zip(places.tolist(), run.limits, strict=False)
+    note = _unconverged([x for x, limit in pairs if limit.status is solver.LimitStatus.NOT_CONVERGED], len(places))
     return replace(ending, message="; ".join(filter(None, (ending.message, note))))
 
 
@@ -618,7 +613,7 @@ def _limit_state(run: AnalysisRun, loads: solver.Loads, at: Standing, programs: 
 def _limit(run: AnalysisRun, loads: solver.Loads, at: Standing, displacement: float) -> solver.LimitLoad:
     """Find a limit load whose open joints may close within a displacement [m]."""
     case, assembly = run.given.case, run.given.assembly
-    try:
+    with naming(str(case.source)):
         return solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
             pose=at.pose,
             ties_at=at.ties,
@@ -628,8 +623,6 @@ def _limit(run: AnalysisRun, loads: solver.Loads, at: Standing, displacement: fl
             displacement=displacement,
             overlap_tolerance=case.controls.overlap_tolerance,
         )
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None
 
 
 def _displacement(case: Case, assembly: solver.Assembly) -> float:

@@ -14,6 +14,7 @@ from blockvis.cases.block_at import block_at
 from blockvis.cases.contents import Case
 from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
+from blockvis.formats.reading import naming
 from blockvis.layout.names import blocks_called
 from blockvis.results.about import EXACT, mechanism_text
 from blockvis.text import nearest
@@ -211,7 +212,7 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechani
         pose, ties_at, bonds_at = increment.pose, increment.ties, increment.bonds
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
         return not_reached(steps.ending, "nothing is left to push over")
-    try:
+    with naming(str(case.source)):
         pushed = mechanics.pushover_increments(
             given.assembly,
             control,
@@ -228,6 +229,4 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechani
         for number, increment in enumerate(pushed):
             words = left_by(case.settlements) if number == 0 and resume is None else []
             yield replace(increment, notes=(*increment.notes, *words))
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None
     return pushed.ending

@@ -13,6 +13,7 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
+from blockvis.formats.reading import naming
 from blockvis.results.about import (
     collapse_phase,
     in_phase,
@@ -117,7 +118,7 @@ class SettlementKind(AnalysisKind):
                 return f"{value:12.6g} N·m"
             return f"{value:12.6g} N   {value / weight:.6f} W"
 
-        lines = [": ".join(told) for told in changes_told(response)]
+        lines = list(map(": ".join, changes_told(response)))
         lines += [f"loss: {note}" for note in losses_of(response)]
         if _method(response) == LINEAR_PROGRAM:
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
@@ -292,7 +293,7 @@ def settlement_steps(
     case = given.case
     if not case.settlements:
         return without_increments()
-    try:
+    with naming(str(case.source)):
         return mechanics.settlement_increments(
             given.assembly,
             case.settlements,
@@ -304,8 +305,6 @@ def settlement_steps(
             resume=resume,
             on_step=given.step,
         )
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None
 
 
 def left_by(settlements: Sequence[solver.Settlement]) -> list[str]:

@@ -12,7 +12,7 @@ import shapely
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
-from .outlines import ROUNDING, around_hole, pieces_of, ring_area, ring_of, without_collinear
+from .outlines import ROUNDING, around_hole, ends_of, pieces_of, ring_area, ring_of, without_collinear
 from .surfaces import same_points
 
 #: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
@@ -96,7 +96,7 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
         )
         return LeftOut("crossing", ring, message)
     border, *holes = (np.array(one.coords)[:-1] for one in (around.exterior, *around.interiors))
-    return around_hole(name, border, holes)
+    return around_hole(f"block '{name}'", border, holes)
 
 
 def _crossing(ring: np.ndarray) -> np.ndarray:
@@ -109,7 +109,7 @@ def crossings_of(ring: np.ndarray) -> np.ndarray:
     if len(ring) < 3 or not np.isfinite(ring).all():
         return np.zeros((0, 2))
     lines = shapely.get_parts(shapely.node(shapely.LinearRing(ring)))
-    ends = np.array([line.coords[k] for line in lines for k in (0, -1)])
+    ends = ends_of(map(shapely.get_coordinates, lines))
     same = same_points(ends, ROUNDING * float(np.ptp(ring, axis=0).max()))
     # A ring that is cut where it meets nothing has two ends there.
     places, counts = np.unique(same, return_counts=True)

@@ -12,9 +12,9 @@ from .outlines import ROUNDING
 from .solids import Solid, cross, off_planes, planes_of, sides_of, triangles_of, volume, width_of
 from .surfaces import cleaned
 
-#: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
-#: of stones by a tenth of it.
-WARPED = 0.01
+#: In drawings in space faces lie in one plane up to this fraction of the width of a block: modellers warp those of
+#: stones by a tenth of it, and those of real vaults overlap by up to 8e-4, their corners being as far off.
+OFF_PLANE = 0.01
 
 #: Neighbouring triangles whose normals differ by more than this angle (15 degrees) are different faces.
 SAME_FACE = np.cos(np.radians(15.0))
@@ -44,7 +44,7 @@ def with_plane_faces(points: np.ndarray, triangles: np.ndarray) -> PlaneSolid:
     points, triangles = points[used], index.reshape(-1, 3)
     if volume(points, triangles) < 0.0:
         triangles = triangles[:, ::-1]
-    near = WARPED * width_of(points, triangles)
+    near = OFF_PLANE * width_of(points, triangles)
     faces = [ring for region in _regions(points, triangles, near) for ring in _rings_of(triangles[region])]
     return fitted(*_without_straight(points, faces, near), near)
 

@@ -11,15 +11,11 @@ import shapely
 import solver
 from solver.mechanics import counted
 
-from .faces import flattened
+from .faces import OFF_PLANE, flattened
 from .linked import linked
 from .outlines import ROUNDING
 from .solids import Solid, area_vectors, planes_of, volume, width_of
 from .surfaces import cleaned, is_closed
-
-#: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
-#: otherwise: drawings of real vaults overlap by up to 8e-4 of a block, and their corners are as far off.
-DEFAULT_FACING = 0.01
 
 #: Faces whose normals are this far from opposite (cosine of 10 degrees) are no joint.
 OPPOSITE = -np.cos(np.radians(10.0))
@@ -54,6 +50,10 @@ class _Faces:
     rings: list[np.ndarray]
     areas: np.ndarray
 
+    def off(self, face: int, plane: np.ndarray) -> float:
+        """How far the corner of a face that is farthest from a plane, (4,) array, is from it."""
+        return float(np.abs(self.rings[face] @ plane[:3] - plane[3]).max())
+
 
 def facing_tolerance(
     solids: Sequence[Solid], joint_thickness: float = 0.0, overlap_tolerance: float | None = None
@@ -62,7 +62,7 @@ def facing_tolerance(
 
     A tolerance below that does not face less: it refuses what is left.
     """
-    default = DEFAULT_FACING * float(np.median([width_of(*solid) for solid in solids]))
+    default = OFF_PLANE * float(np.median([width_of(*solid) for solid in solids]))
     return max(joint_thickness, overlap_tolerance or 0.0, default)
 
 
@@ -242,13 +242,8 @@ def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray
     one, other = one[pair], other[pair]
     along = np.abs(np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3])) > -OPPOSITE
     one, other = one[along], other[along]
-    off = [
-        max(
-            float(np.abs(faces.rings[b] @ faces.planes[a, :3] - faces.planes[a, 3]).max()),
-            float(np.abs(faces.rings[a] @ faces.planes[b, :3] - faces.planes[b, 3]).max()),
-        )
-        for a, b in zip(one.tolist(), other.tolist(), strict=True)
-    ]
+    pairs = zip(one.tolist(), other.tolist(), strict=True)
+    off = [max(faces.off(b, faces.planes[a]), faces.off(a, faces.planes[b])) for a, b in pairs]
     flat = np.array(off, dtype=float) <= 2.0 * near
     return one[flat], other[flat]
 
@@ -296,23 +291,19 @@ def _flat_groups(
         if holds_both_sides(group, sides):
             return False
         plane = _common_plane(faces, group, sides)
-        return all(np.abs(faces.rings[k] @ plane[:3] - plane[3]).max() <= near for k in group)
+        return all(faces.off(k, plane) <= near for k in group)
 
     def holds_both_sides(group: list[int], sides: np.ndarray) -> bool:
         # A thin stone whose faces lay in one plane would be none any more.
         blocks = faces.block[group]
         return bool(np.intersect1d(blocks[sides > 0.0], blocks[sides < 0.0]).size)
 
-    def off(pair: tuple[int, int]) -> float:
-        a, b = pair
-        return float(np.abs(faces.rings[b] @ faces.planes[a, :3] - faces.planes[a, 3]).max())
-
     if is_flat(members):
         return [(members, _sides(faces, members))]
     groups: dict[int, list[int]] = {k: [k] for k in members}
     if holds_both_sides(members, _sides(faces, members)):
         # The joints above and below a thin stone are told apart by the faces that are nearest.
-        pairs = sorted(pairs, key=off)
+        pairs = sorted(pairs, key=lambda pair: faces.off(pair[1], faces.planes[pair[0]]))
     else:
         pairs = sorted(pairs, key=lambda pair: -min(faces.areas[pair[0]], faces.areas[pair[1]]))
     for a, b in pairs:

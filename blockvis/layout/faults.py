@@ -10,7 +10,7 @@ import shapely
 
 from .crossings import crossings_of
 from .layout import Layout, Outline, assembly_of
-from .outlines import ROUNDING
+from .outlines import ROUNDING, ends_of
 from .solids import Solid
 from .surfaces import same_points
 
@@ -71,7 +71,7 @@ def _open_ends(layout: Layout) -> np.ndarray:
         return np.zeros((0, 2))
     near = ROUNDING * float(np.ptp(np.concatenate(lines), axis=0).max())
     tree = shapely.STRtree([shapely.LineString(points) for points in lines])
-    ends = np.array([points[k] for points in lines for k in (0, -1)])
+    ends = ends_of(lines)
     end, other = tree.query(shapely.points(ends), "dwithin", near)
     met = np.zeros(len(ends), dtype=bool)
     met[end[other != end // 2]] = True

@@ -21,7 +21,7 @@ from .joints.facing_edges import Facing, open_shares, rounded_up
 from .layout import Layout
 from .outlines import ROUNDING
 from .refusal import carrying
-from .repair import DEFAULT_OVERLAP, overlaps
+from .repair import DEFAULT_OVERLAP, DRAWN_GAP, overlaps
 from .roles import roles_of, told_apart
 from .simplify import default_tolerance, simplified
 from .solids import size_of, width_of
@@ -29,9 +29,9 @@ from .solids import size_of, width_of
 #: Classes of joint thickness in the report.
 CLASSES = 8
 
-#: Gaps between faces that cover each other are joints drawn open between these parts of the width of a typical block;
-#: narrower ones are rounding of coordinates.
-SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
+#: Gaps between faces that cover each other are joints drawn open up to this part of the width of a typical block; those
+#: below what counts as one place in a drawing are rounding of coordinates.
+WIDEST_JOINT = 0.2
 
 #: Gaps are mortar where this share of the length of all joints is open, or where this share of the open length has
 #: as much on the other side of its block, more than beside a single row of stones; else they are openings, cracks or
@@ -174,7 +174,7 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     # Joints are measured as a run closes them.
     simple, finer = simplified(outlines, default_tolerance(outlines))
     proposal = proposed(simple, laid=np.array(layout.laid))
-    smallest = SMALLEST_JOINT * width
+    smallest = DRAWN_GAP * width
     shares = open_shares(simple, proposal.stretches, smallest)
     is_mortar = shares[0] >= MORTAR_SHARE or shares[1] >= OPPOSITE_SHARE
     return {
@@ -291,7 +291,7 @@ def _open_joints(assembly: solver.Assembly, width: float) -> list[tuple[int, int
     np.maximum.at(high, joint, contacts.gaps)
     area = np.bincount(joint, contacts.areas, minlength=n)
     # What touches somewhere, or opens like a wedge, is no joint that was drawn open.
-    found = (low > SMALLEST_JOINT * width) & (high < 2.0 * low) & (area > (0.3 * width) ** 2)
+    found = (low > DRAWN_GAP * width) & (high < 2.0 * low) & (area > (0.3 * width) ** 2)
     gaps = [(int(i), int(j), float(gap)) for (i, j), gap in zip(pairs[found], high[found], strict=True)]
     beside: dict[int, set[int]] = {}
     for i, j in pairs.tolist():

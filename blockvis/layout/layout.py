@@ -24,8 +24,8 @@ Outline = np.ndarray
 #: Surrogate halves of characters, which escaped JSON and bytes that are no text leave behind.
 _HALVES = re.compile("[\ud800-\udfff]")
 
-#: What a drawing may say of every block in a word.
-_WORDS = ("names", "groups", "roles", "materials")
+#: What is known of every block beside its name, and what stands where nothing is.
+_UNSAID: dict[str, Any] = {"groups": "", "roles": "", "materials": "", "looks": (), "within": (), "laid": False}
 
 
 @dataclass(frozen=True)
@@ -88,23 +88,18 @@ class Layout:
     laid: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that there is one word of each kind per block, and replace broken characters."""
-        for kind in _WORDS:
-            if kind != "names" and not getattr(self, kind):
-                object.__setattr__(self, kind, ("",) * self.n_blocks)
+        """Check that there is one of each kind per block, and replace broken characters."""
+        for kind in ("names", *_UNSAID):
+            if kind in _UNSAID and not getattr(self, kind):
+                object.__setattr__(self, kind, (_UNSAID[kind],) * self.n_blocks)
             if len(getattr(self, kind)) != self.n_blocks:
                 raise ValueError(
                     f"{mechanics.counted(self.n_blocks, 'block')} but {len(getattr(self, kind))} {kind}; "
                     "give one per block"
                 )
-        for key in ("looks", "within"):
-            if not getattr(self, key):
-                object.__setattr__(self, key, ((),) * self.n_blocks)
-        if not self.laid:
-            object.__setattr__(self, "laid", (False,) * self.n_blocks)
         # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
         note = "characters that the file's encoding does not have are shown as \ufffd"
-        for kind in _WORDS:
+        for kind in ("names", "groups", "roles", "materials"):
             words = getattr(self, kind)
             whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
             if whole != tuple(words) and note not in self.notes:
@@ -162,19 +157,16 @@ class Layout:
         """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]
         taken: dict[str, Any] = {}
-        for kind in ("blocks", *_WORDS, "looks", "within", "laid", "thickness", "density"):
+        for kind in ("blocks", "names", *_UNSAID, "thickness", "density"):
             of = getattr(self, kind)
             taken[kind] = tuple(of[i] for i in keep) if isinstance(of, tuple) else of if of is None else of[keep]
         return replace(self, **taken)
 
     def with_more(self, blocks: Sequence[Outline | Solid], **of_blocks: Sequence[Any]) -> Layout:
         """Add blocks, with what is known of them: names, roles, materials, density, thickness, laid."""
-        nothing = ((),) * len(blocks)
-        taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks)}
-        taken |= {"looks": self.looks + nothing, "within": self.within + nothing}
-        taken["laid"] = self.laid + tuple(of_blocks.get("laid", (False,) * len(blocks)))
-        for kind in _WORDS:
-            taken[kind] = getattr(self, kind) + tuple(of_blocks.get(kind, ("",) * len(blocks)))
+        taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks), "names": (*self.names, *of_blocks["names"])}
+        for kind, nothing in _UNSAID.items():
+            taken[kind] = getattr(self, kind) + tuple(of_blocks.get(kind, (nothing,) * len(blocks)))
         for kind in ("density",) if self.dimension == 3 else ("density", "thickness"):
             known, more = getattr(self, kind), of_blocks.get(kind)
             if known is not None or more is not None:

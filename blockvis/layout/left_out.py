@@ -59,10 +59,6 @@ class LeftOut:
         holes = tuple(ring * np.asarray(factors) for ring in self.holes)
         return replace(self, points=self.points * np.asarray(factors), holes=holes)
 
-    def turned(self, turn: np.ndarray) -> LeftOut:
-        """Take the directions in the rows of a matrix for its coordinates."""
-        return replace(self, points=self.points @ turn.T, holes=tuple(ring @ turn.T for ring in self.holes))
-
     @property
     def place(self) -> np.ndarray:
         """(2,) array [m]: a point of it, for messages."""

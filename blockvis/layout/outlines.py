@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import shapely
 
 from .left_out import LeftOut
+from .linked import equal_rows
 from .notes import CHANGED, UPRIGHT, Note
 from .views import VIEWS, axis_across, upright_note
 
@@ -160,12 +161,15 @@ def ring_of(polygon: Any) -> np.ndarray:
     return np.array(shapely.orient_polygons(polygon).exterior.coords)[:-1]
 
 
-def around_hole(name: str, outline: np.ndarray, holes: Sequence[np.ndarray]) -> LeftOut:
+def ends_of(lines: Iterable[np.ndarray]) -> np.ndarray:
+    """(2 n, d) array: the first and the last point of each of n lines, one line after another."""
+    return np.concatenate([points[[0, -1]] for points in lines])
+
+
+def around_hole(called: str, outline: np.ndarray, holes: Sequence[np.ndarray]) -> LeftOut:
     """Say that a block has a hole; its outline and those of its holes are (n, 2) arrays."""
     x, y = holes[0].mean(axis=0)
-    message = (
-        f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
-    )
+    message = f"{called} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
     return LeftOut("hole", outline, message, holes=tuple(holes))
 
 
@@ -231,12 +235,7 @@ def outlines_of_cells(
     real = start != end
     start, end, block = start[real], end[real], block[real]
     key = np.stack([block, np.minimum(start, end), np.maximum(start, end)], axis=1)
-    order = np.lexsort(key.T[::-1])
-    ordered = key[order]
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    group = np.cumsum(new) - 1
-    once = np.sort(order[np.bincount(group)[group] == 1])
+    once = np.setdiff1d(np.arange(len(key)), np.concatenate(equal_rows(key)))
     edges: list[list[tuple[int, int]]] = [[] for _ in names]
     for i in once:
         edges[block[i]].append((int(start[i]), int(end[i])))
@@ -278,7 +277,7 @@ def _ring(
     if len(rings) == 1:
         return ring, None
     if len(filled(rings)) == 1:
-        return ring, around_hole(name, ring, rings[1:])
+        return ring, around_hole(f"block '{name}'", ring, rings[1:])
     x, y = rings[1].mean(axis=0)
     message = (
         f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"

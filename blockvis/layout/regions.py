@@ -16,7 +16,7 @@ from solver import mechanics
 from .layout import Layout
 from .left_out import LeftOut, matches
 from .notes import CHANGED, Note
-from .outlines import ROUNDING, filled, largest_piece, ring_of, share_in
+from .outlines import ROUNDING, ends_of, filled, largest_piece, ring_of, share_in
 from .roles import roles_of
 from .selection import ANNOTATIONS, labels_of
 
@@ -225,7 +225,7 @@ def _no_outline(layout: Layout, drawn: Sequence[_Drawn], key: str, pattern: str)
 
 def _smallest_gap(lines: Sequence[LeftOut]) -> tuple[float, np.ndarray]:
     """Smallest distance between ends of lines that do not meet [m], and where that is."""
-    ends = np.array([one.points[k] for one in lines for k in (0, -1)])
+    ends = ends_of(one.points for one in lines)
     apart = np.hypot(*(ends[:, None] - ends).transpose(2, 0, 1))
     size = float(np.ptp(np.concatenate([one.points for one in lines]), axis=0).max())
     apart[apart <= ROUNDING * size] = np.inf

@@ -7,8 +7,8 @@ import numpy as np
 
 def cells_of_ring(ring: np.ndarray) -> list[tuple[int, ...]]:
     """Cover a counter-clockwise ring with cells: the ring itself if it has three corners or four convex ones."""
-    n = len(ring)
-    if n == 3 or (n == 4 and (_turns(ring) > 0).all()):
+    n, u, v = len(ring), ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    if n == 3 or (n == 4 and (u[:, 0] * v[:, 1] > u[:, 1] * v[:, 0]).all()):
         return [tuple(range(n))]
     return [tuple(triangle) for triangle in triangles_of_ring(ring).tolist()]
 
@@ -22,8 +22,3 @@ def triangles_of_ring(ring: np.ndarray) -> np.ndarray:
     turns_left = x @ np.roll(y, -1) >= y @ np.roll(x, -1)
     # The fast way through convex outlines leaves more slivers.
     return np.asarray(triangulate([about if turns_left else about * [1.0, -1.0]], allow_convex=False))
-
-
-def _turns(points: np.ndarray) -> np.ndarray:
-    u, v = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
+from .layout import Layout
 from .outlines import share_in
-
-if TYPE_CHECKING:
-    from .layout import Layout
 
 #: Outlines within another are openings if they cover at most this fraction of it, and lie farther apart than this
 #: fraction of their size: stones on a background lie closer.
@@ -38,13 +36,14 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
     # Of two points a hatch has an outline, too.
     blocks = [shapely.Polygon(ring if len(ring) > 2 else None) for ring in layout.outlines]
     blocks = [shape if shape.is_valid else shapely.Polygon() for shape in blocks]
+    areas = shapely.area(blocks)
     found: dict[str, str] = {}
     counted, walls = np.zeros(layout.n_blocks, bool), list[Any]()
     for wall, label, holes, black in _possible_walls(layout, blocks):
         # Around a wall there may be a hatch of it, or the frame of the sheet.
         if not wall.is_valid or wall.area == 0.0 or any(share_in(one, wall) > 0.99 for one in walls):
             continue
-        small = [i for i in np.flatnonzero(~counted).tolist() if 0.0 < blocks[i].area < 0.9 * wall.area]
+        small = np.flatnonzero(~counted & (areas > 0.0) & (areas < 0.9 * wall.area)).tolist()
         inside = [i for i in small if share_in(blocks[i], wall) > 0.99]
         is_page = black and inside and all(WHITE in layout.looks[i] for i in inside)
         if not _are_openings(wall, [blocks[i] for i in inside], holes) or (is_page and not pages):

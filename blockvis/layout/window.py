@@ -45,7 +45,7 @@ def within_window(layout: Layout, window: Sequence[float]) -> Layout:
             return "beyond"
         return "within" if (points >= low - near).all() and (points <= high + near).all() else "edge"
 
-    of_blocks = [place(ring) for ring in layout.outlines]
+    of_blocks = [*map(place, layout.outlines)]
     if "within" not in of_blocks:
         every = np.concatenate([*layout.outlines, np.zeros((0, 2))])
         extent, remedy = "draws no block at all", "correct the window"

@@ -11,8 +11,7 @@ from PIL import Image
 from blockvis.cases.contents import Case
 from blockvis.formats import FORMATS
 from blockvis.formats.annotations import annotated_placement, program_of
-from blockvis.formats.image_scale import Placement, placement_of, written_placement
-from blockvis.formats.images import opened
+from blockvis.formats.image_scale import Placement, opened, placement_of, written_placement
 from blockvis.formats.reading import Reading
 from blockvis.layout.units import metres_per
 from blockvis.pictures.underlay import Underlay

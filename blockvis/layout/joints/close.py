@@ -171,10 +171,8 @@ def _to_nearest_stone(
 ) -> Closing:
     found = facing_edges(outlines, thickness, overlap)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
-    n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum())
-    closed = share_out(outlines, thickness, anchored, mortar)
-    largest = float(found.gaps.max(initial=0.0, where=found.gaps > CLOSED * scale))
-    return Closing(tuple(closed), n_open, 0, largest, "voronoi")
+    n_open, largest = found.open(CLOSED * scale)
+    return Closing(tuple(share_out(outlines, thickness, anchored, mortar)), n_open, 0, largest, "voronoi")
 
 
 def _between_faces(
@@ -188,7 +186,7 @@ def _between_faces(
     found = facing_edges(rings, thickness, overlap, laid)
     found = found.chosen(~(anchored[edges.block[found.edge_a]] & anchored[edges.block[found.edge_b]]))
     closed = CLOSED * scale
-    n_open = int((np.abs(found.gaps).max(axis=1) > closed).sum())
+    n_open, largest = found.open(closed)
     if n_open == 0 and overlap == 0.0:
         return Closing(tuple(outlines), 0, 0, 0.0)
     lines, uncommon = common_lines(found, edges, anchored, closed)
@@ -200,7 +198,7 @@ def _between_faces(
         outlines=tuple(outlines[i] if anchored[i] else ring + origin for i, ring in enumerate(final)),
         n_joints=n_open,
         n_cut=len(uncommon),
-        largest_gap=float(found.gaps.max(initial=0.0, where=found.gaps > closed)),
+        largest_gap=largest,
     )
 
 

@@ -52,6 +52,11 @@ class Facing:
         """Return the number of stretches."""
         return len(self.edge_a)
 
+    def open(self, closed: float) -> tuple[int, float]:
+        """Count the stretches that are open or overlap, by more than ``closed`` [m], and give the largest gap [m]."""
+        n_open = int((np.abs(self.gaps).max(axis=1) > closed).sum())
+        return n_open, float(self.gaps.max(initial=0.0, where=self.gaps > closed))
+
     def chosen(self, keep: np.ndarray) -> Facing:
         """Take only these stretches; ``keep`` is a (n,) bool array."""
         return Facing(self.edge_a[keep], self.edge_b[keep], self.gaps[keep], self.midline[keep], self.lengths[keep])
