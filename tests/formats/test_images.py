@@ -520,6 +520,22 @@ def test_a_pinhole_does_not_lose_its_stone(tmp_path):
     assert any(note.startswith("pinholes were filled") for note in layout.notes)
 
 
+def test_noise_in_a_stone_does_not_lose_it(tmp_path):
+    """Specks within specks, and specks that hang at the joint by their corners, as where grain is as dark as mortar."""
+    image, n = drawn_wall()
+    stones = 1e-4 * np.count_nonzero(np.asarray(image))
+    draw = ImageDraw.Draw(image)
+    for x in (40, 48):
+        draw.rectangle((x, 30, x + 5, 35), fill=0)
+        draw.rectangle((x + 1, 31, x + 4, 34), fill=255)
+    for k in range(12):
+        draw.rectangle((60 + 2 * (k % 2), 20 + 2 * k, 61 + 2 * (k % 2), 21 + 2 * k), fill=0)
+    image.save(tmp_path / "wall.png")
+    layout = read_layout(tmp_path / "wall.png", width=3.0, smallest=0.08)
+    assert (layout.n_blocks, len(layout.left_out)) == (n, 0)
+    assert sum(Polygon(ring).area for ring in layout.blocks) == pytest.approx(stones, rel=1e-3)
+
+
 def test_pictures_beside_files_of_stones_are_no_stones(tmp_path):
     for k in range(2):
         text = f"v {k} 0 0\nv {k + 1} 0 0\nv {k + 1} 1 0\nv {k} 1 0\nf 1 2 3 4\n"
