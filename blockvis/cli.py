@@ -258,7 +258,9 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         # Parameters on either side of an option.
         options.parameters += left
     elif left:
-        parser.error(f"unrecognized arguments: {' '.join(left)}")
+        of_patterns = next((flag for flag in ("ignore", "only") if getattr(options, flag, None)), "")
+        remedy = f"; give each pattern its own --{of_patterns}" if of_patterns else ""
+        parser.error(f"unrecognized arguments: {' '.join(left)}{remedy}")
     return options
 
 

@@ -308,7 +308,8 @@ def _by_place(coordinate: Mapping[str, Any], words: str) -> ValueKind:
 ROLES = Section(
     "roles",
     "Role of blocks by their name, group (layer) or material, or a pattern of them, which holds over what the file "
-    "says; or by their place, for files without names",
+    "says; or by their place, for files without names: touching holds over below, box over both, of one key the later "
+    "table over the earlier, and a name over all",
     (Key("below", _by_place(NUMBER.schema, "a number"), "Blocks whose middle lies below", {"z": 0.1}, "m",
          otherwise="none"),
      Key("touching", _by_place(NUMBER.schema, "a number"), "Blocks that reach a plane", {"x": 3.0, "role": "moving"},
