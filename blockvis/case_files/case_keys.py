@@ -122,7 +122,8 @@ def _places(table: Table, key: Key) -> tuple[float, ...] | None:
     if len(given) != 3 or given[2] != int(given[2]) or not 2 <= given[2] <= MOST_STEPS or given[0] >= given[1]:
         says = f"[first x, last x, number of places], from 2 to {MOST_STEPS} places"
         raise table.error(key.name, f"is {list(given)}; give {says}")
-    return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
+    # Tables have -2.2, and not -2.1999999999999997.
+    return tuple(np.linspace(given[0], given[1], int(given[2])).round(12).tolist())
 
 
 def _read_by(read: Callable[[Any], Any], take: Callable[[Table, str], Any] = Table.take) -> Callable[[Table, Key], Any]:
