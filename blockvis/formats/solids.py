@@ -148,10 +148,15 @@ def _obj(path: Path) -> Bodies:
         own, triangles = np.unique(fans(one.faces), return_inverse=True)
         if len(own):
             parts.append(Body(name, every[own], triangles.reshape(-1, 3), one.row(name, word)))
-    rows = _own_rows(path)
-    if word == "o" and _distinct(rows) == [part.name for part in parts]:
-        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
-    return Bodies(parts, grouped=word != "o", notes=_inherited(objects))
+    rows, notes = _own_rows(path), _inherited(objects)
+    if word == "o" and rows:
+        # Others may stand beside what we wrote, which is of the objects that still have its names.
+        written = dict(zip(_distinct(rows), rows, strict=True))
+        parts = [replace(part, said=written.get(part.name, part.said)) for part in parts]
+        lost = [f"'{name}'" for name in written if name not in objects]
+        words = f"not read: what blockvis wrote of {counted(len(lost), 'block')}, {listed(lost)}: no object is called so"
+        notes = [*notes, *[Note(LEFT_OUT, words)] * bool(lost)]
+    return Bodies(parts, grouped=word != "o", notes=notes)
 
 
 def _off(path: Path) -> Bodies:
