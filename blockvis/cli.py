@@ -968,21 +968,24 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     from .results.fall_files import known_fall
     from .runs.reopen import open_results
 
+    suffix = target.suffix.lower()
     given = [name for name, value in vars(options).items() if name in _OF_LAYOUTS and value not in _OF_LAYOUTS[name]]
-    if given:
+    # As files of bodies want them, blocks of the plane may be put into space.
+    into_space = options.dimension == "3" and suffix not in (".vtkhdf", ".glb")
+    if given != ["dimension"] * into_space:
         raise ValueError(
             f"--{given[0].replace('_', '-')} is of layout files; '{options.source}' holds results: leave it out"
         )
     response = open_results(options.source)
     gone = loss_words(response.path[-1]) if response.path else []
-    if target.suffix.lower() == ".vtkhdf":
+    if suffix == ".vtkhdf":
         from .results.vtkhdf import write_vtkhdf
 
         write_vtkhdf(response, target)
         increments, blocks = counted(len(response.path), "increment"), counted(response.assembly.n_blocks, "block")
         print(f"{increments} of {blocks} written to {target}")
         return 0
-    if target.suffix.lower() == ".glb":
+    if suffix == ".glb":
         from .pictures.animated_glb import write_animated_glb
 
         write_animated_glb(response, target, known_fall(response))
@@ -990,12 +993,14 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
         print(f"{counted(response.assembly.n_blocks, 'block')} that move written to {target}{vanishing}")
         return 0
     from .formats.read import write_layout
-    from .layout.layout import layout_of
+    from .layout.layout import layout_of, standing
 
     if not response.path:
         raise ValueError(f"there is no deformed layout: {response.message or response.stop}")
     last = response.path[-1]
     layout = layout_of(response.assembly, pose=last.pose).chosen(np.flatnonzero(~last.fallen))
+    if into_space and layout.dimension == 2:
+        layout = standing(layout, 1.0)
     write_layout(layout, target)
     unit, phase = unit_in(response, last.phase), in_phase(response, last.phase)
     where = f"{response.parameter.name} {last.parameter:.6g} {unit}".rstrip() + phase
