@@ -105,8 +105,8 @@ def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> 
     notes = _notes(labels, regions, found, placement)
     if filled:
         size = regions.smallest * placement.pixel
-        text = f"pinholes were filled, less than {100 * PINHOLES:g} % of their stone or {size:.3g} m across (smallest), "
-        notes = (*notes, Note(CHANGED, f"{text}of {len(filled)}, the first '{names[filled[0]]}'"))
+        text = f"pinholes were filled, less than {100 * PINHOLES:g} % of their stone or {size:.3g} m across (smallest)"
+        notes = (*notes, Note(CHANGED, f"{text}, of {len(filled)}, the first '{names[filled[0]]}'"))
     if labels.is_mask and not (reading.ignore or reading.only):
         notes = (*notes, *maybe_openings(rings, names, holes))
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)

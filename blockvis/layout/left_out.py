@@ -33,7 +33,7 @@ KINDS = {
 }
 
 #: Layers of ties, whose lines are members where a case says so.
-TIES = re.compile(r"\b(ties?|tie.?rods?|tirant[eis]*|caten[ae]|tensores|zug(anker|stangen?|bänder)|tiebars?)\b", re.IGNORECASE)
+TIES = re.compile(r"\b(ties?|tie.?(rod|bar)s?|tirant[eis]*|caten[ae]|tensores|zug(anker|stangen?))\b", re.IGNORECASE)
 
 #: Ends of a line this part of its size apart were meant to meet.
 NEARLY = 0.01
@@ -105,7 +105,7 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
         at = f", {'the first ' if len(members) > 1 else ''}{called}at ({x:.6g}, {y:.6g})" if len(first.points) else ""
         nearly = any(item.miss and item.miss < NEARLY * float(np.ptp(item.points, axis=0).max()) for item in members)
         are_ties = kind == "open" and TIES.search(layer)
-        tied = f"; to take them for ties: [geometry] ties = [\"{layer}\"]" if are_ties else ""
+        tied = f'; to take them for ties: [geometry] ties = ["{layer}"]' if are_ties else ""
         text = f"left out: {len(members)} {words}{where}{at}{ends}{', nearly an outline: close it' * nearly}{tied}"
         lines.append(Note(LEFT_OUT, text))
     return lines
