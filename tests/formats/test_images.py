@@ -530,9 +530,12 @@ def test_noise_in_a_stone_does_not_lose_it(tmp_path):
         draw.rectangle((x + 1, 31, x + 4, 34), fill=255)
     for k in range(12):
         draw.rectangle((60 + 2 * (k % 2), 20 + 2 * k, 61 + 2 * (k % 2), 21 + 2 * k), fill=0)
+    # A letter below has a hole, and is no wall to fill with bricks.
+    draw.ellipse((100, 138, 122, 158), outline=255, width=3)
     image.save(tmp_path / "wall.png")
     layout = read_layout(tmp_path / "wall.png", width=3.0, smallest=0.08)
-    assert (layout.n_blocks, len(layout.left_out)) == (n, 0)
+    assert (layout.n_blocks, [item.kind for item in layout.left_out]) == (n, ["hole"])
+    assert not any("with a bond" in note for note in layout.notes)
     assert sum(Polygon(ring).area for ring in layout.blocks) == pytest.approx(stones, rel=1e-3)
 
 
