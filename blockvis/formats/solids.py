@@ -154,8 +154,8 @@ def _obj(path: Path) -> Bodies:
         written = dict(zip(_distinct(rows), rows, strict=True))
         parts = [replace(part, said=written.get(part.name, part.said)) for part in parts]
         lost = [f"'{name}'" for name in written if name not in objects]
-        words = f"not read: what blockvis wrote of {counted(len(lost), 'block')}, {listed(lost)}: no object"
-        notes = [*notes, *[Note(LEFT_OUT, f"{words} is called so")] * bool(lost)]
+        told = f"not read: what blockvis wrote of {counted(len(lost), 'block')}, {listed(lost)}: no object"
+        notes = [*notes, *[Note(LEFT_OUT, f"{told} is called so")] * bool(lost)]
     return Bodies(parts, grouped=word != "o", notes=notes)
 
 
