@@ -231,6 +231,8 @@ def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placeme
         f"{what} in {width} × {height} pixels of {1e3 * placement.pixel:.4g} mm ({placement.source}); background: "
         f"{share}; {found.corners} corners of pixels were simplified to {sum(map(len, found.rings))}"
     ]
+    if labels.is_of_lines:
+        notes[0] += "; what lines do not enclose is paper: where stones are missing, close them"
     if labels.moved:
         share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"
         text = (
