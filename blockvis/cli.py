@@ -415,7 +415,9 @@ def _add_render(verbs: Any) -> None:
     render.add_argument(
         "--animation", default="collapse.mp4", help="in OUT: .mp4, .gif, .webp, a folder such as frames/, or none"
     )
-    render.add_argument("--magnification", type=float, default=1.0, help="of displacements; without forces and hinges")
+    render.add_argument(
+        "--magnification", type=_number, default=1.0, help="of displacements; without forces and hinges"
+    )
     render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
@@ -462,16 +464,16 @@ def _add_reading(verb: argparse.ArgumentParser, *, in_space: bool = True) -> Non
     verb.add_argument(
         "--window",
         nargs=4,
-        type=float,
+        type=_number,
         metavar=("X0", "Y0", "X1", "Y1"),
         help="read what lies within this rectangle of the plane, in m, as info prints coordinates",
     )
     of_image = "of an image, or of that of annotations"
     for flag in ("--width", "--height"):
-        verb.add_argument(flag, type=float, metavar="M", help=f"{flag[2:]} {of_image}, in m")
-    verb.add_argument("--pixel", type=float, metavar="M", help=f"size of a pixel {of_image}, in m, instead")
+        verb.add_argument(flag, type=_number, metavar="M", help=f"{flag[2:]} {of_image}, in m")
+    verb.add_argument("--pixel", type=_number, metavar="M", help=f"size of a pixel {of_image}, in m, instead")
     verb.add_argument("--background", metavar="VALUE", help='value, or colour such as "white", of what is no stone')
-    verb.add_argument("--smallest", type=float, metavar="M", help="less of an image than this across is a speck")
+    verb.add_argument("--smallest", type=_number, metavar="M", help="less of an image than this across is a speck")
 
 
 def _add_bond(verbs: Any) -> None:
@@ -1170,11 +1172,18 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+class _NoNumber(argparse.ArgumentTypeError, ValueError):
+    """A word of the command line is no number, in the words of a parser too."""
+
+
 def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"'{text}' is not a number") from None
+        whole, comma, part = text.partition(",")
+        digits = whole.lstrip("-").isdigit() and part.isdigit()
+        remedy = f"; numbers have a point: {whole}.{part}" if comma and digits else ""
+        raise _NoNumber(f"'{text}' is not a number{remedy}") from None
 
 
 def _parameter(given: str) -> tuple[str, Any]:

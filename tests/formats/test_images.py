@@ -332,6 +332,16 @@ def test_stones_may_be_as_narrow_as_lines_are(tmp_path, form, stone):
         assert not any("lines" in note for note in layout.notes)
 
 
+def test_a_decimal_comma_of_an_option_is_told(tmp_path, capsys):
+    for width, said in (
+        ("5,8", "'5,8' is not a number; numbers have a point: 5.8"),
+        ("wide", "'wide' is not a number\n"),
+    ):
+        with pytest.raises(SystemExit):
+            main(["info", str(tmp_path / "wall.png"), "--width", width])
+        assert said in capsys.readouterr().err
+
+
 def test_specks_go_to_what_is_around_them_and_are_told(tmp_path, capsys):
     image, n = drawn_wall()
     draw = ImageDraw.Draw(image)
