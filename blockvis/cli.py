@@ -258,7 +258,9 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         # Parameters on either side of an option.
         options.parameters += left
     elif left:
-        parser.error(f"unrecognized arguments: {' '.join(left)}")
+        of_patterns = next((flag for flag in ("ignore", "only") if getattr(options, flag, None)), "")
+        remedy = f"; give each pattern its own --{of_patterns}" if of_patterns else ""
+        parser.error(f"unrecognized arguments: {' '.join(left)}{remedy}")
     return options
 
 
@@ -413,7 +415,9 @@ def _add_render(verbs: Any) -> None:
     render.add_argument(
         "--animation", default="collapse.mp4", help="in OUT: .mp4, .gif, .webp, a folder such as frames/, or none"
     )
-    render.add_argument("--magnification", type=float, default=1.0, help="of displacements; without forces and hinges")
+    render.add_argument(
+        "--magnification", type=_number, default=1.0, help="of displacements; without forces and hinges"
+    )
     render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
@@ -460,16 +464,16 @@ def _add_reading(verb: argparse.ArgumentParser, *, in_space: bool = True) -> Non
     verb.add_argument(
         "--window",
         nargs=4,
-        type=float,
+        type=_number,
         metavar=("X0", "Y0", "X1", "Y1"),
         help="read what lies within this rectangle of the plane, in m, as info prints coordinates",
     )
     of_image = "of an image, or of that of annotations"
     for flag in ("--width", "--height"):
-        verb.add_argument(flag, type=float, metavar="M", help=f"{flag[2:]} {of_image}, in m")
-    verb.add_argument("--pixel", type=float, metavar="M", help=f"size of a pixel {of_image}, in m, instead")
+        verb.add_argument(flag, type=_number, metavar="M", help=f"{flag[2:]} {of_image}, in m")
+    verb.add_argument("--pixel", type=_number, metavar="M", help=f"size of a pixel {of_image}, in m, instead")
     verb.add_argument("--background", metavar="VALUE", help='value, or colour such as "white", of what is no stone')
-    verb.add_argument("--smallest", type=float, metavar="M", help="less of an image than this across is a speck")
+    verb.add_argument("--smallest", type=_number, metavar="M", help="less of an image than this across is a speck")
 
 
 def _add_bond(verbs: Any) -> None:
@@ -966,21 +970,24 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     from .results.fall_files import known_fall
     from .runs.reopen import open_results
 
+    suffix = target.suffix.lower()
     given = [name for name, value in vars(options).items() if name in _OF_LAYOUTS and value not in _OF_LAYOUTS[name]]
-    if given:
+    # As files of bodies want them, blocks of the plane may be put into space.
+    into_space = options.dimension == "3" and suffix not in (".vtkhdf", ".glb")
+    if given != ["dimension"] * into_space:
         raise ValueError(
             f"--{given[0].replace('_', '-')} is of layout files; '{options.source}' holds results: leave it out"
         )
     response = open_results(options.source)
     gone = loss_words(response.path[-1]) if response.path else []
-    if target.suffix.lower() == ".vtkhdf":
+    if suffix == ".vtkhdf":
         from .results.vtkhdf import write_vtkhdf
 
         write_vtkhdf(response, target)
         increments, blocks = counted(len(response.path), "increment"), counted(response.assembly.n_blocks, "block")
         print(f"{increments} of {blocks} written to {target}")
         return 0
-    if target.suffix.lower() == ".glb":
+    if suffix == ".glb":
         from .pictures.animated_glb import write_animated_glb
 
         write_animated_glb(response, target, known_fall(response))
@@ -988,12 +995,14 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
         print(f"{counted(response.assembly.n_blocks, 'block')} that move written to {target}{vanishing}")
         return 0
     from .formats.read import write_layout
-    from .layout.layout import layout_of
+    from .layout.layout import layout_of, standing
 
     if not response.path:
         raise ValueError(f"there is no deformed layout: {response.message or response.stop}")
     last = response.path[-1]
     layout = layout_of(response.assembly, pose=last.pose).chosen(np.flatnonzero(~last.fallen))
+    if into_space and layout.dimension == 2:
+        layout = standing(layout, 1.0)
     write_layout(layout, target)
     unit, phase = unit_in(response, last.phase), in_phase(response, last.phase)
     where = f"{response.parameter.name} {last.parameter:.6g} {unit}".rstrip() + phase
@@ -1163,11 +1172,18 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+class _NoNumber(argparse.ArgumentTypeError, ValueError):
+    """A word of the command line is no number, in the words of a parser too."""
+
+
 def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"'{text}' is not a number") from None
+        whole, comma, part = text.partition(",")
+        digits = whole.lstrip("-").isdigit() and part.isdigit()
+        remedy = f"; numbers have a point: {whole}.{part}" if comma and digits else ""
+        raise _NoNumber(f"'{text}' is not a number{remedy}") from None
 
 
 def _parameter(given: str) -> tuple[str, Any]:

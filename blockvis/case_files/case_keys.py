@@ -122,7 +122,8 @@ def _places(table: Table, key: Key) -> tuple[float, ...] | None:
     if len(given) != 3 or given[2] != int(given[2]) or not 2 <= given[2] <= MOST_STEPS or given[0] >= given[1]:
         says = f"[first x, last x, number of places], from 2 to {MOST_STEPS} places"
         raise table.error(key.name, f"is {list(given)}; give {says}")
-    return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
+    # Tables have -2.2, and not -2.1999999999999997.
+    return tuple(np.linspace(given[0], given[1], int(given[2])).round(12).tolist())
 
 
 def _read_by(read: Callable[[Any], Any], take: Callable[[Table, str], Any] = Table.take) -> Callable[[Table, Key], Any]:
@@ -308,7 +309,8 @@ def _by_place(coordinate: Mapping[str, Any], words: str) -> ValueKind:
 ROLES = Section(
     "roles",
     "Role of blocks by their name, group (layer) or material, or a pattern of them, which holds over what the file "
-    "says; or by their place, for files without names",
+    "says; or by their place, for files without names: touching holds over below, box over both, of one key the later "
+    "table over the earlier, and a name over all",
     (Key("below", _by_place(NUMBER.schema, "a number"), "Blocks whose middle lies below", {"z": 0.1}, "m",
          otherwise="none"),
      Key("touching", _by_place(NUMBER.schema, "a number"), "Blocks that reach a plane", {"x": 3.0, "role": "moving"},

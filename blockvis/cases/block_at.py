@@ -77,7 +77,7 @@ def block_at(
             inside = f"; it lies in the {what} '{assembly.names[other]}', which is not meant"
         raise ValueError(
             f"{where} {place} m lies in none of the blocks meant; the nearest is '{assembly.names[nearest]}', "
-            f"{apart[nearest]:.3g} m away{inside}"
+            f"{apart[nearest]:.3g} m away{inside}; give a point of a block"
         )
     if gone[holding].all():
         raise ValueError(

@@ -368,10 +368,12 @@ def _check_degrees(found: Drawing, path: Path, reading: Reading, system: str, *,
         zone = int((x.mean() + 180.0) % 360.0 // 6.0) + 1
         code = (32600 if y.mean() >= 0.0 else 32700) + zone
         unless = "" if system else "; if they are no degrees, give their unit"
+        # What the file says of its system, if anything, is then another one.
+        from_degrees = "" if system else "-s_srs EPSG:4326 "
         raise ValueError(
             f"it is in degrees{f' ({system})' if system else ''}: its median block is {median:.2g} across, near "
-            f"({x[0]:.6f}, {y[0]:.6f}); reproject it to metres: ogr2ogr -t_srs EPSG:{code} {path.stem}_m.gpkg "
-            f"{path.name}{unless}"
+            f"({x[0]:.6f}, {y[0]:.6f}); reproject it to metres: ogr2ogr {from_degrees}-t_srs EPSG:{code} "
+            f"{path.stem}_m.gpkg {path.name}{unless}"
         )
     if system:
         found.notes.append(

@@ -29,7 +29,7 @@ FEWEST_OF_CHART, LEAST_OF_SMALL = 20, 0.05
 #: More specks than this, and than so many for each region, are those of shading and of hatching.
 MOST_SPECKS, SPECKS_OF_ONE = 200, 4
 
-#: Holes of no more than this fraction of a stone are filled.
+#: Holes of no more than this fraction of a stone are filled, and those that are specks.
 PINHOLES = 0.01
 
 #: A region of so many times the median area may be an opening, and of half as many in a drawing of lines, whose
@@ -65,14 +65,15 @@ def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> 
     if smallest is None:
         _check_sizes(regions, placement)
     found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
-    holes = {k: inner for k, inner in found.holes.items() if _hole_share(found.rings[k], inner) > PINHOLES}
+    holes = {k: inner for k, inner in found.holes.items() if _is_open(found.rings[k], inner, regions.smallest)}
     filled = [k for k in found.holes if k not in holes]
     names, groups = _named(labels, regions)
     rings = tuple(_turned(placement.placed(ring * [1.0, -1.0])) for ring in found.rings)
     notes = _notes(labels, regions, found, placement)
     if filled:
-        text = f"pinholes were filled, each less than {100 * PINHOLES:g} % of its stone, of {len(filled)}, the first "
-        notes = (*notes, Note(CHANGED, f"{text}'{names[filled[0]]}'"))
+        size = regions.smallest * placement.pixel
+        text = f"pinholes were filled, less than {100 * PINHOLES:g} % of their stone or {size:.3g} m across (smallest)"
+        notes = (*notes, Note(CHANGED, f"{text}, of {len(filled)}, the first '{names[filled[0]]}'"))
     if labels.is_mask and not (reading.ignore or reading.only):
         notes = (*notes, *maybe_openings(rings, names, holes))
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
@@ -142,9 +143,10 @@ def _check_sizes(regions: Regions, placement: Placement) -> None:
     )
 
 
-def _hole_share(ring: np.ndarray, holes: tuple[np.ndarray, ...]) -> float:
-    """Fraction of an outline that is holes."""
-    return sum(abs(ring_area(hole)) for hole in holes) / abs(ring_area(ring))
+def _is_open(ring: np.ndarray, holes: tuple[np.ndarray, ...], smallest: float) -> bool:
+    """Whether holes are openings, and neither small beside their outline nor specks, which touch at corners."""
+    areas = [abs(ring_area(hole)) for hole in holes]
+    return sum(areas) > PINHOLES * abs(ring_area(ring)) and max(areas) >= smallest**2
 
 
 def maybe_openings(rings: Sequence[np.ndarray], names: Sequence[str], holed: Collection[int]) -> list[str]:
@@ -196,6 +198,8 @@ def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placeme
         f"{what} in {width} × {height} pixels of {1e3 * placement.pixel:.4g} mm ({placement.source}); background: "
         f"{share}; {found.corners} corners of pixels were simplified to {sum(map(len, found.rings))}"
     ]
+    if labels.is_of_lines:
+        notes[0] += "; what lines do not enclose is paper: where stones are missing, close them"
     if labels.moved:
         share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"
         text = (

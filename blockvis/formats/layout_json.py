@@ -149,7 +149,8 @@ def write(layout: Layout, path: Path) -> None:
         if layout.dimension == 2:
             # The path is a temporary one, which tells nobody anything.
             raise ValueError(
-                "a name that ends in .compas.json is for blocks in space; give dimension 3, or write to .json"
+                "a name that ends in .compas.json is for blocks in space; give --dimension 3 (dimension=3), or write "
+                "to .json"
             )
         compas_json.write(layout, path)
         return

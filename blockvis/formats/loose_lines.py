@@ -262,7 +262,7 @@ def _crossing_notes(
             many = counted(len(across), "line")
             said.append(f"{many} on layer '{layer}'{f' ({types})' if types else ''} around {counted(n, 'face')}")
     words = f"lines run across those of other layers: {', '.join(said)}; leave them out (ignore) if they are no joints"
-    return [Note(CHANGED, words)] if said else []
+    return [Note(CHANGED, f"{words}, or name their layer in [geometry] ties if they are ties")] if said else []
 
 
 def refuse_open(found: Drawing, what: str, remedy: str, unit: str, factors: Sequence[float] = (1, 1)) -> None:

@@ -123,18 +123,20 @@ def _numbered(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _targets(numbers: np.ndarray, of_region: np.ndarray, small: np.ndarray) -> np.ndarray:
     """(n,) array: the region that each becomes part of; itself where it is no speck, 0 where nothing is around it."""
     n = len(of_region)
-    target = np.where(small, 0, np.arange(n)).astype(np.int32)
+    target = np.where(small, -1, np.arange(n)).astype(np.int32)
     sides = [(numbers[:, :-1], numbers[:, 1:]), (numbers[:-1], numbers[1:])]
     across = [np.stack([a[a != b], b[a != b]]) for a, b in sides]
     one, other = np.concatenate([*across, *(pair[::-1] for pair in across)], axis=1).astype(np.int64)
-    wanted = small[one] & ~small[other]
-    pairs, edges = np.unique(one[wanted] * n + other[wanted], return_counts=True)
-    order = np.argsort(edges, kind="stable")
-    speck, neighbour = pairs[order] // n, pairs[order] % n
-    target[speck] = neighbour
-    several = np.bincount(speck, of_region[neighbour] > 0, minlength=n) > 1
-    target[(of_region == 0) & small & several] = 0
-    return target
+    pairs, edges = np.unique(one[small[one]] * n + other[small[one]], return_counts=True)
+    speck, neighbour = np.divmod(pairs[np.argsort(edges, kind="stable")], n)
+    # Specks lie in specks: from the outermost inwards each becomes what those around it have become.
+    while (ready := (target[speck] < 0) & (target[neighbour] >= 0)).any():
+        inner, outer = speck[ready], target[neighbour[ready]]
+        target[inner] = outer
+        joined, region = np.divmod(np.unique(inner * n + outer), n)
+        several = np.bincount(joined, of_region[region] > 0, minlength=n) > 1
+        target[(of_region == 0) & several] = 0
+    return np.maximum(target, 0)
 
 
 def outlined(regions: Regions, tolerance: float = STAIRS) -> Outlined:

@@ -122,10 +122,15 @@ def _obj(path: Path) -> Bodies:
             )
         parts.append(body_of_polygons(name, points, one.faces, one.row(name, word)))
     parts = [part for part in parts if len(part.faces)]
-    rows = _own_rows(path)
-    if word == "o" and _distinct(rows) == [part.name for part in parts]:
-        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
-    return Bodies(parts, grouped=word != "o", notes=_inherited(objects))
+    rows, notes = _own_rows(path), _inherited(objects)
+    if word == "o" and rows:
+        # Others may stand beside what we wrote, which is of the objects that still have its names.
+        written = dict(zip(_distinct(rows), rows, strict=True))
+        parts = [replace(part, said=written.get(part.name, part.said)) for part in parts]
+        lost = [f"'{name}'" for name in written if name not in objects]
+        told = f"not read: what blockvis wrote of {counted(len(lost), 'block')}, {listed(lost)}: no object"
+        notes = [*notes, *[Note(LEFT_OUT, f"{told} is called so")] * bool(lost)]
+    return Bodies(parts, grouped=word != "o", notes=notes)
 
 
 def _obj_objects(text: str, word: str, of_all: set[str], unnamed: str) -> tuple[np.ndarray, dict[str, _Object]]:

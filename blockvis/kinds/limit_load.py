@@ -58,6 +58,9 @@ CLOSING = 1e-3
 #: Part of a multiplier by which that of joints that stay open has to differ to be told.
 NOTABLE = 0.01
 
+#: So many times the displacement by which open joints may close, a note tells the multiplier where it is another.
+MORE = 10.0
+
 #: Positions of a load that a note lists.
 MOST_LISTED = 8
 
@@ -529,7 +532,7 @@ def _over_places(
         else:
             loads = dead.with_forces(run.given.assembly, live(number), "live")
             state = replace(_limit_state(run, loads, standing, programs), parameter=float(x))
-            if (stays := _staying_open(run, loads, standing)) is not None:
+            if (stays := _closing(run, loads, standing, 0.0)) is not None:
                 run.limits[-1] = replace(run.limits[-1], staying_open=stays.multiplier)
                 state = replace(state, programs=state.programs + stays.increment.programs)
             if number == 0 and (words := _closing_words(run)):
@@ -582,22 +585,26 @@ def _differs(limit: solver.LimitLoad, least: float) -> bool:
     return math.isfinite(least) and not math.isclose(limit.multiplier, least, rel_tol=NOTABLE)
 
 
-def _staying_open(run: AnalysisRun, loads: solver.Loads, at: Standing) -> solver.LimitLoad | None:
-    """Find the last limit load where joints that are open stay so; None where they do, or unknown."""
+def _closing(run: AnalysisRun, loads: solver.Loads, at: Standing, times: float) -> solver.LimitLoad | None:
+    """Find the last limit load where joints that are open close by so many times more; None where that is unknown."""
     # Without dilatancy it takes many programs, not one more.
     asked = _closing_words(run) and run.given.case.settings.flow == FLOWS[0]
     if not asked or math.isnan(run.limits[-1].multiplier):
         return None
-    return _limit(run, loads, at, 0.0)
+    return _limit(run, loads, at, times * _displacement(run.given.case, run.given.assembly))
 
 
 def _closing_note(run: AnalysisRun, at: solver.Increment, first: bool) -> list[str]:
-    """Say within which displacement open joints may close, at the first state, and α where they do not."""
+    """Say within which displacement open joints may close, at the first state, and α where they close less or more."""
     words, limit = _closing_words(run), run.limits[-1]
-    stays = _staying_open(run, run.given.loads, Standing.at(at))
-    if stays is not None and _differs(limit, least := stays.multiplier):
-        where = f"{at.parameter:.6g} {run.given.case.settlements[at.phase].unit}"
-        return [f"at a settlement of {where} α = {limit.multiplier:.6g}, {least:.6g} without: {words}"]
+    told = []
+    for times, where in ((0.0, "without"), (MORE, f"where they close by {MORE:g} times as much")):
+        other = _closing(run, run.given.loads, Standing.at(at), times)
+        if other is not None and _differs(limit, other.multiplier):
+            told.append(f"{other.multiplier:.6g} {where}")
+    if told:
+        place = f"{at.parameter:.6g} {run.given.case.settlements[at.phase].unit}"
+        return [f"at a settlement of {place} α = {', '.join([f'{limit.multiplier:.6g}', *told])}: {words}"]
     return [words] if words and first else []
 
 

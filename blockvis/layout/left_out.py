@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -30,6 +31,9 @@ KINDS = {
     "asked": ("outline, as asked for", "outlines, as asked for"),
     "asked line": ("line, as asked for", "lines, as asked for"),
 }
+
+#: Layers of ties, whose lines are members where a case says so.
+TIES = re.compile(r"\b(ties?|tie.?(rod|bar)s?|tirant[eis]*|caten[ae]|tensores|zug(anker|stangen?))\b", re.IGNORECASE)
 
 #: Ends of a line this part of its size apart were meant to meet.
 NEARLY = 0.01
@@ -96,7 +100,9 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
         ends = f", {'their' if len(members) > 1 else 'its'} ends {apart} apart" if misses else ""
         at = f", {'the first ' if len(members) > 1 else ''}{called}at ({x:.6g}, {y:.6g})" if len(first.points) else ""
         nearly = any(item.miss and item.miss < NEARLY * float(np.ptp(item.points, axis=0).max()) for item in members)
-        text = f"left out: {len(members)} {words}{where}{at}{ends}{', nearly an outline: close it' * nearly}"
+        are_ties = kind == "open" and TIES.search(layer)
+        tied = f'; to take them for ties: [geometry] ties = ["{layer}"]' if are_ties else ""
+        text = f"left out: {len(members)} {words}{where}{at}{ends}{', nearly an outline: close it' * nearly}{tied}"
         lines.append(Note(LEFT_OUT, text))
     return lines
 

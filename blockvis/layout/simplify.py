@@ -18,6 +18,9 @@ from .outlines import folded
 #: Outlines of more corners than this in the mean are finer than needed: every corner at a joint is a contact.
 FINE = 24
 
+#: Where too many corners are left, so many times the tolerance is proposed.
+LARGER = 3.0
+
 #: Corners go within this fraction of the size of the median block (the root of its area).
 TOLERANCE = 0.01
 
@@ -55,6 +58,9 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
         said = f"{fine}within {tolerance:.2g} m (outline_tolerance) {spoilt} would fold or overlap others"
         return list(outlines), said if kept and before > FINE * len(outlines) else ""
     rest = f"; {spoilt} that would fold or overlap others kept all of them" if kept else ""
+    if after > FINE * len(outlines):
+        rest += f"; {after / len(outlines):.0f} a block are many still, as along grain of a scan, with which a run is "
+        rest += f"slow or fails: a larger outline_tolerance, {LARGER * tolerance:.1g}, leaves fewer"
     return found, (
         f"outlines were finer than needed: {before} corners of {of} were simplified to {after} "
         f"within {tolerance:.2g} m (outline_tolerance; 0 keeps every corner){rest}"

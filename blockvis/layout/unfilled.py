@@ -39,9 +39,11 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
     areas = shapely.area(blocks)
     found: dict[str, str] = {}
     counted, walls = np.zeros(layout.n_blocks, bool), list[Any]()
+    # A letter beside stones has holes, too.
+    least = float(np.median(shapely.area(blocks))) if blocks else 0.0
     for wall, label, holes, black in _possible_walls(layout, blocks):
         # Around a wall there may be a hatch of it, or the frame of the sheet.
-        if not wall.is_valid or wall.area == 0.0 or any(share_in(one, wall) > 0.99 for one in walls):
+        if not (wall.is_valid and 0.0 < wall.area >= least) or any(share_in(one, wall) > 0.99 for one in walls):
             continue
         small = np.flatnonzero(~counted & (areas > 0.0) & (areas < 0.9 * wall.area)).tolist()
         inside = [i for i in small if share_in(blocks[i], wall) > 0.99]

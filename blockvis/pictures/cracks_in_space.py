@@ -21,6 +21,7 @@ from .frame import Frame, Key, Sheet, framed, sheet_size, write_labels
 from .paired_scenes import PairedScenes
 from .sight_lines import SightLines
 from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, section_words, views_of
+from .surface import IN_PLANE
 from .swing import swing_of
 
 #: Widths between the classes are of these, times a power of ten [mm]; most classes; thinnest and thickest line in
@@ -58,10 +59,11 @@ class CracksInSpace:
         plane = plane_of(assembly, cut, self._views[0])
         #: The section in words; none without one.
         self.section = section_words(plane)
-        self._opened = opened.chosen(heights_over(plane, opened.middles) >= 0.0)
+        near = IN_PLANE * float(np.ptp(assembly.vertices, axis=0).max())
+        self._opened = opened.over(plane, near)
         moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
         slides = np.isin(edges.joints, slid_joints(assembly, moved))
-        self._slid = edges.chosen(slides & (heights_over(plane, edges.middles) >= 0.0))
+        self._slid = edges.chosen(slides).over(plane, near)
         self._slips = np.abs(moved[self._slid.joints, 1])
         self.slip = float(self._slips.max(initial=0.0))
         self._seen_joints = np.zeros(0, dtype=int)
@@ -181,6 +183,11 @@ class _Edges:
     def chosen(self, which: np.ndarray) -> _Edges:
         """Choose pieces by numbers, or by (n,) bool."""
         return _Edges(self.ends[which], self.openings[which], self.joints[which], self.across[which])
+
+    def over(self, plane: np.ndarray | None, near: float) -> _Edges:
+        """Choose those of joints that a section leaves: of one in its plane, within so much [m], it shows one side."""
+        heights = heights_over(plane, self.middles)
+        return self.chosen((heights >= -near) & np.isin(self.joints, self.joints[heights > near]))
 
 
 def _showing(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -214,8 +215,6 @@ class Drawer:
         self.tints: np.ndarray | None = None
         if look.colour_by == "mechanism" and self._swing is not None and self._swing.moves:
             self.tints = mechanism_colours(assembly, self.fill, self._swing)
-        #: Whether the mechanism acts at increments, by phase and parameter.
-        self._acting: dict[tuple[int, float], bool] = {}
         #: Where the blocks are drawn while a mechanism is shown.
         self._drawn_at: solver.Pose | None = None
         #: Ends (n, 2, d) [m] of the arrows in the picture, by layer: labels leave them free.
@@ -572,10 +571,20 @@ class Drawer:
         if not self.response.parameter.is_path and len(self.response.path) > 1 and len(self.increments) > 1:
             # Of states that stand by themselves one would flash in a film.
             return False
-        if place not in self._acting:
-            same = np.array_equal(mechanics.rigid_parts(self.assembly, increment), swing.parts)
-            self._acting[place] = same or place == (swing.increment.phase, swing.increment.parameter)
-        return self._acting[place]
+        return place in self._acting
+
+    @cached_property
+    def _acting(self) -> set[tuple[int, float]]:
+        """Phase and parameter of the increments from which on the mechanism acts: one between others would flash."""
+        assert self._swing is not None
+        found = {(self._swing.increment.phase, self._swing.increment.parameter)}
+        for increment in reversed(self.response.path):
+            place = increment.phase, increment.parameter
+            same = place in found or np.array_equal(mechanics.rigid_parts(self.assembly, increment), self._swing.parts)
+            if not same:
+                break
+            found.add(place)
+        return found
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
         """Draw open and sliding joints, hinges and what crushes; returns where dots are drawn, (n, d) [m]."""

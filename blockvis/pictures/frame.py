@@ -34,6 +34,9 @@ NARROW = 48.0
 #: the caption below its title.
 HEADER, FOOTER, ROWS = 5.1, (3.3, 4.6), 2
 
+#: Middle of a title of one and of two rows, and those of the first row below it and from each to the next.
+TITLE, DETAIL = (0.72, 0.55), ((2.0, 1.2), (2.7, 1.05))
+
 #: Widths of curve and colour bar beside the blocks, and the largest height of the curve, in heights of the text.
 CURVE, BAR, HIGHEST_CURVE = 23.0, 7.6, 29.0
 
@@ -136,7 +139,8 @@ class Sheet:
         [m], and the picture ``beside`` that of :attr:`beside`.
         """
         beside_title = self._room(badge) >= _font(round(1.15 * self.text), bold=True).getlength(title)
-        shared = tuple(keys), pixel, detail, badge, beside_title
+        titles, font = self._titles(title, badge if beside_title else "", several=not badge)
+        shared = tuple(keys), pixel, detail, badge, beside_title, len(titles)
         if shared != self._page_of:
             # One at a time: joints open and slide now and then, and a page at any size is memory.
             self._page, self._page_of = self._around(*shared), shared
@@ -144,10 +148,15 @@ class Sheet:
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
-        self._title(ImageDraw.Draw(page), title, badge if beside_title else "")
+        draw = ImageDraw.Draw(page)
+        for row, words in enumerate(titles):
+            y = self.pad + (TITLE[len(titles) - 1] + 1.05 * row) * self.text
+            draw.text((self.pad, y), words, palette.INK, font, anchor="lm")
         return page
 
-    def _around(self, keys: Sequence[Key], pixel: float, detail: str, badge: str, beside_title: bool) -> Image.Image:
+    def _around(
+        self, keys: Sequence[Key], pixel: float, detail: str, badge: str, beside_title: bool, titles: int
+    ) -> Image.Image:
         """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
         page = Image.new("RGB", self.size, palette.PAPER)
         draw = ImageDraw.Draw(page)
@@ -159,16 +168,20 @@ class Sheet:
         if not beside_title:
             room[-1] = self._room(badge)
         rows, font = fitting_rows(detail, round(SMALL * self.text), room)
+        top, step = DETAIL[titles - 1]
         for row, words in enumerate(rows):
-            draw.text((self.pad, self.pad + (2.0 + 1.2 * row) * self.text), words, palette.FAINT, font, anchor="lm")
+            draw.text((self.pad, self.pad + (top + step * row) * self.text), words, palette.FAINT, font, anchor="lm")
         if badge:
             # Beside a long title it would make that small.
             self._badge(draw, badge, self.pad + 2.55 * self.text * (not beside_title))
         return page
 
-    def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
+    def _titles(self, title: str, badge: str, *, several: bool) -> tuple[list[str], ImageFont.FreeTypeFont]:
+        """Rows of a title and their font: several where in one its letters were smaller than those below it."""
         font = fitting_font(title, round(1.15 * self.text), self._room(badge), bold=True)
-        draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
+        if several and font.size < round(SMALL * self.text):
+            return fitting_rows(title, self.text, [self._room("")] * len(TITLE), bold=True)
+        return [title], font
 
     def _badge(self, draw: ImageDraw.ImageDraw, badge: str, top: float) -> None:
         left, half = self._room(badge) + 2 * self.pad, 0.75 * self.text
@@ -381,10 +394,12 @@ def fitting_font(text: str, size: int, room: float, bold: bool = False) -> Image
     return font
 
 
-def fitting_rows(text: str, size: int, room: Sequence[float]) -> tuple[list[str], ImageFont.FreeTypeFont]:
+def fitting_rows(
+    text: str, size: int, room: Sequence[float], *, bold: bool = False
+) -> tuple[list[str], ImageFont.FreeTypeFont]:
     """Break a text between its parts into rows with so much room each, in the largest font up to ``size`` that fits."""
     while True:
-        font, parts, rows = _font(size), text.split(SEPARATOR), list[str]()
+        font, parts, rows = _font(size, bold), text.split(SEPARATOR), list[str]()
         for wide in room:
             count = sum(font.getlength(SEPARATOR.join(parts[:n])) <= wide for n in range(1, len(parts) + 1))
             rows.append(SEPARATOR.join(parts[:count]))

@@ -170,7 +170,10 @@ def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):
     path = geojson(tmp_path / "rome.geojson", [polygon(ring) for ring in rings])
     said = refusal(path)
     assert "is in degrees: its median block is 2.8e-06 across" in said
-    assert "ogr2ogr -t_srs EPSG:32633 rome_m.gpkg rome.geojson; if they are no degrees, give their unit" in said
+    assert (
+        "ogr2ogr -s_srs EPSG:4326 -t_srs EPSG:32633 rome_m.gpkg rome.geojson; if they are no degrees, give their unit"
+        in said
+    )
     assert blockvis.read_layout(path, unit="km").n_blocks == 4
     stated = {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}}
     geojson(path, [polygon((-np.array(ring)).tolist()) for ring in rings], **stated)

@@ -332,6 +332,16 @@ def test_stones_may_be_as_narrow_as_lines_are(tmp_path, form, stone):
         assert not any("lines" in note for note in layout.notes)
 
 
+def test_a_decimal_comma_of_an_option_is_told(tmp_path, capsys):
+    for width, said in (
+        ("5,8", "'5,8' is not a number; numbers have a point: 5.8"),
+        ("wide", "'wide' is not a number\n"),
+    ):
+        with pytest.raises(SystemExit):
+            main(["info", str(tmp_path / "wall.png"), "--width", width])
+        assert said in capsys.readouterr().err
+
+
 def test_specks_go_to_what_is_around_them_and_are_told(tmp_path, capsys):
     image, n = drawn_wall()
     draw = ImageDraw.Draw(image)
@@ -518,6 +528,25 @@ def test_a_pinhole_does_not_lose_its_stone(tmp_path):
     layout = read_layout(tmp_path / "wall.png", width=3.0, smallest=0.03)
     assert (layout.n_blocks, len(layout.left_out)) == (n, 0)
     assert any(note.startswith("pinholes were filled") for note in layout.notes)
+
+
+def test_noise_in_a_stone_does_not_lose_it(tmp_path):
+    """Specks within specks, and specks that hang at the joint by their corners, as where grain is as dark as mortar."""
+    image, n = drawn_wall()
+    stones = 1e-4 * np.count_nonzero(np.asarray(image))
+    draw = ImageDraw.Draw(image)
+    for x in (40, 48):
+        draw.rectangle((x, 30, x + 5, 35), fill=0)
+        draw.rectangle((x + 1, 31, x + 4, 34), fill=255)
+    for k in range(12):
+        draw.rectangle((60 + 2 * (k % 2), 20 + 2 * k, 61 + 2 * (k % 2), 21 + 2 * k), fill=0)
+    # A letter below has a hole, and is no wall to fill with bricks.
+    draw.ellipse((100, 138, 122, 158), outline=255, width=3)
+    image.save(tmp_path / "wall.png")
+    layout = read_layout(tmp_path / "wall.png", width=3.0, smallest=0.08)
+    assert (layout.n_blocks, [item.kind for item in layout.left_out]) == (n, ["hole"])
+    assert not any("with a bond" in note for note in layout.notes)
+    assert sum(Polygon(ring).area for ring in layout.blocks) == pytest.approx(stones, rel=1e-3)
 
 
 def test_pictures_beside_files_of_stones_are_no_stones(tmp_path):

@@ -232,6 +232,13 @@ def test_points_of_an_obj_file_may_be_counted_back_from_their_line(tmp_path):
         assert [np.ptp(points, axis=0).tolist() for points, _ in found.solids] == [[3, 1, 1], [2, 1, 1], [1, 1, 1]]
 
 
+def test_what_we_wrote_of_objects_holds_beside_others(tmp_path):
+    ours = '# blockvis {"name": "foot", "role": "moving"}\no foot', '# blockvis {"name": "gone"}\no renamed'
+    found = read_layout(wavefront(tmp_path / "a.obj", *((words, 3) for words in (*ours, "o added"))), dimension=3)
+    assert (found.names, found.roles) == (("foot", "renamed", "added"), ("moving", "", ""))
+    assert any("what blockvis wrote of 1 block, 'gone': no object is called so" in note for note in found.notes)
+
+
 def test_groups_name_the_stones_of_an_obj_file_without_objects(tmp_path):
     path = wavefront(tmp_path / "a.obj", ("g Mesh1 fixed_base1 Model", 3), ("g pier left", 2))
     found = read_layout(path, dimension=3)

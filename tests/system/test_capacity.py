@@ -333,13 +333,14 @@ capacity_at = [0.004]
     assert re.search(r"after a settlement of +0\.004 m\n", said.out)
     (note,) = summary["notes"]
     assert note in said.err
-    closing, apart = (
+    more, closing, apart = (
         ran(text.replace("[0.004]", f"[0.004]\ndisplacement = {within}") + SIDEWAYS, tmp_path, "--force")[1]
-        for within in (0.0001, 0.0)
+        for within in (0.001, 0.0001, 0.0)
     )
-    with_it, without = (f"{one['limit_load_multiplier']:.6g}" for one in (closing, apart))
+    wider, with_it, without = (f"{one['limit_load_multiplier']:.6g}" for one in (more, closing, apart))
     assert note.startswith(
-        f"at a settlement of 0.004 m α = {with_it}, {without} without: joints that are open may close"
+        f"at a settlement of 0.004 m α = {with_it}, {without} without, {wider} where they close by 10 times as much: "
+        "joints that are open may close"
     )
     # Bricks are 0.1 m high.
     assert "by up to 0.0001 m" in note

@@ -208,3 +208,7 @@ def test_lost_blocks_are_left_out_of_the_deformed_layout(tmp_path, capsys):
 def test_options_of_layout_files_are_refused_for_results(folder, tmp_path, capsys):
     assert main(["convert", str(folder), str(tmp_path / "a.dxf"), "--unit", "mm"]) == 2
     assert "--unit is of layout files" in capsys.readouterr().err
+    assert main(["convert", str(folder), str(tmp_path / "a.compas.json")]) == 2
+    assert "--dimension 3" in capsys.readouterr().err
+    assert main(["convert", str(folder), str(tmp_path / "a.compas.json"), "--dimension", "3"]) == 0
+    assert blockvis.read_layout(tmp_path / "a.compas.json").n_blocks == blockvis.open_results(folder).assembly.n_blocks

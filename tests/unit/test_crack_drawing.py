@@ -86,7 +86,7 @@ def test_cracks_in_space_are_darker_where_they_are_wider(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, monkeypatch):
-    """Three boxes in a row, of two joints the one that is open by 20 mm is cut away."""
+    """Three boxes in a row, of two joints the one that is open by 20 mm is cut away, or one lies in the section."""
     assembly = solver.Assembly.from_solids([box((x, 0, 0), (x + 1, 1, 1)) for x in (0, 1, 2)])
     pose = solver.Pose.initial(assembly)
     pose.positions[:, 0] += -0.005, 0.0, 0.02
@@ -95,16 +95,23 @@ def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, monkeypatch):
     monkeypatch.setattr(
         sheet, "composed", lambda *args, **given: (details.append(given["detail"]), composed(*args, **given))[1]
     )
-    for section, view in (("x = 1.5", "left"), ("x = 1.5", "right"), ("y = 0.5", "front"), ("x = 0.5", "right")):
+    for section, view in (
+        ("x = 1.5", "left"),
+        ("x = 1.5", "right"),
+        ("y = 0.5", "front"),
+        ("x = 0.5", "right"),
+        ("x = 1", "left"),
+    ):
         draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE, section=section, view=view)
     assert ["   ·   ".join(detail.split("   ·   ")[:2]) for detail in details] == [
         "2 cracks, of which the section shows 1   ·   the widest 20 mm",
         "2 cracks, of which the section shows 1   ·   the widest 5 mm",
         "2 cracks   ·   the widest 20 mm",
         "2 cracks, of which the section shows none   ·   drawn on the layout",
+        "2 cracks, of which the section shows 1   ·   the widest 20 mm",
     ]
     assert [detail.split("   ·   ")[-1] for detail in details] == [
-        f"section {plane} m" for plane in ("x = 1.5", "x = 1.5", "y = 0.5", "x = 0.5")
+        f"section {plane} m" for plane in ("x = 1.5", "x = 1.5", "y = 0.5", "x = 0.5", "x = 1")
     ]
 
 

@@ -532,6 +532,19 @@ def test_the_film_has_the_tints_and_dots_of_the_mechanism(tmp_path):
     assert alike(picture[100:600], palette.HINGE).any()
 
 
+def test_the_tints_of_the_mechanism_do_not_flash():
+    """Of three increments with one mechanism another lies between the first two: only the last two have its tints."""
+    arch = arch_response()
+    last, size = arch.path[-1], (640, 360)
+    other = replace(last.with_arrays(velocity=np.zeros_like(last.velocity)), parameter=0.01)
+    path = replace(last, parameter=0.0), other, replace(last, parameter=0.02), last
+    response = replace(arch, increments=path, collapse=None)
+    drawer = Drawer(response, Look(colour_by="mechanism", forces="none"), size, path)
+    tints = {tuple(tint) for tint in drawer.tints[arch.assembly.free]}
+    pictures = [np.asarray(drawer.picture(one))[60:300] for one in path]
+    assert [all(alike(picture, tint, 6).any() for tint in tints) for picture in pictures] == [False, False, True, True]
+
+
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux for the memory of a process")
 @pytest.mark.thorough
 def test_drawing_takes_little_memory_at_any_size(tmp_path):

@@ -64,6 +64,14 @@ def test_many_corners_are_simplified_within_a_hundredth_of_a_block(tmp_path):
         assert simplified(tmp_path, split_square(60))[1] < 60
 
 
+def test_corners_that_stay_too_many_are_told_with_what_leaves_fewer(tmp_path):
+    rough = split_square(200, amplitude=0.012)
+    with pytest.warns(UserWarning, match=r"a block are many still, .*: a larger outline_tolerance, 0.02, leaves fewer"):
+        many = simplified(tmp_path, rough)[1]
+    with pytest.warns(UserWarning, match=r"0 keeps every corner\)$"):
+        assert simplified(tmp_path, rough, 0.02)[1] < 0.2 * many
+
+
 def test_a_thin_block_is_not_folded(tmp_path):
     x = np.linspace(0.0, 1.0, 60)
     arch = np.vstack(

@@ -175,6 +175,7 @@ def test_lines_on_a_layer_of_a_drawing_are_ties_and_no_joints(tmp_path):
     assert [tie.name for tie in ties] == ["TIES 1", "TIES 2"]
     assert [tie.points for tie in ties] == [((0.25, 1.5), (2.75, 1.5)), ((0.5, 1.0), (2.5, 1.0))]
     assert {tie.strength for tie in ties} == {1e4}
+    assert any('[geometry] ties = ["TIES"]' in note for note in blockvis.read_layout(tmp_path / "piers.dxf").notes)
 
 
 def test_lines_of_an_svg_are_ties(tmp_path):
