@@ -40,9 +40,6 @@ THINNEST = 1.2
 
 Colour = tuple[int, int, int]
 
-#: So many parts of a mechanism have outlines of where it takes them: more would cover the blocks.
-MOST_OUTLINES = 6
-
 
 class FlatScene(Scene):
     """Blocks of the plane and their marks.
@@ -193,12 +190,10 @@ class FlatScene(Scene):
             self.polygons(f"{layer} {name}/head", heads, fill)
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
-        """Draw the largest parts of a mechanism as outlines where it takes them; the blocks stay where they are."""
+        """Draw the parts of a mechanism, where they are few, as outlines where it takes them; the blocks stay."""
         if swing.n_parts <= MOST_PARTS:
             corners = mechanics.moved_vertices(self.assembly, swing.displaced)
-            # Parts are numbered from the largest on.
-            largest = np.where(swing.parts < MOST_OUTLINES, swing.parts, -1)
-            outlines = part_outlines(self.assembly, corners, largest)
+            outlines = part_outlines(self.assembly, corners, swing.parts)
             self.lines("motion outline", outlines, palette.SETTLEMENT, self.usual_height / 600.0)
         self.arrows("motion", tails, tips, palette.SETTLEMENT)
         return swing.increment.pose

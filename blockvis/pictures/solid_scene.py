@@ -161,17 +161,11 @@ class SolidScene(Scene):
         self._surface.points = corners
         self._edges.points = self._traces.points = corners
         if self._shadow is not None:
-            flat, faces = corners, None
+            left = self._surface
             if self._cut is not None:
                 # What the section leaves out throws none: the halves that are left would seem to float.
-                left = self._surface.clip(normal=-self._cut[1], origin=self._cut[0]).triangulate()
-                flat, faces = left.points, left.faces
-            flat = np.array(flat)
-            flat[:, 2] = self._floor
-            if faces is None:
-                self._shadow.points = flat
-            else:
-                self._shadow.copy_from(pv.PolyData(flat, faces=faces))
+                left = left.clip(normal=-self._cut[1], origin=self._cut[0]).triangulate()
+            self._shadow.copy_from(pv.PolyData(left.points * (1.0, 1.0, 0.0) + (0.0, 0.0, self._floor), left.faces))
         if block_fill is not None:
             self._fill = block_fill
             self._surface.cell_data["colour"] = block_fill[self._faced]
