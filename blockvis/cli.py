@@ -66,15 +66,6 @@ PROCESS_SECONDS = 2.0
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
 
-#: Options of ``convert`` that say how a layout file is read, with their defaults: results are no layout file.
-_OF_LAYOUTS: dict[str, tuple[Any, ...]] = {
-    **dict.fromkeys(("unit", "view", "window", "width", "height", "pixel", "background", "smallest"), (None,)),
-    "dimension": ("auto",),
-    "ignore": ([],),
-    "only": ([],),
-    "joint_thickness": ("0",),
-}
-
 #: What ``blockvis completion`` writes for, and where it goes.
 SHELLS = {
     "bash": "blockvis completion bash > ~/.local/share/bash-completion/completions/blockvis",
@@ -966,7 +957,8 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     from .results.fall_files import known_fall
     from .runs.reopen import open_results
 
-    given = [name for name, value in vars(options).items() if name in _OF_LAYOUTS and value not in _OF_LAYOUTS[name]]
+    bare = vars(_options(["convert", options.source, options.target]))
+    given = [name for name, default in bare.items() if name != "force" and getattr(options, name) != default]
     if given:
         raise ValueError(
             f"--{given[0].replace('_', '-')} is of layout files; '{options.source}' holds results: leave it out"

@@ -25,11 +25,11 @@ from blockvis.pictures.captions import (
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.figures import plain_plot, plain_text, saved
-from blockvis.pictures.film import END, PAUSE
+from blockvis.pictures.film import END, PATH_SECONDS, PAUSE
 from blockvis.pictures.frame import fitting_font, framed
+from blockvis.pictures.render import save_picture
 from blockvis.pictures.swing import shown_increments
 from blockvis.pictures.video import write_film
-from blockvis.system.atomic_files import atomic_file
 
 from .compared import Comparison, Side
 
@@ -41,9 +41,6 @@ TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
 
 #: Structures wider than this for their height stand below each other.
 WIDE = 2.5
-
-#: Seconds for the path to the last equilibrium of both.
-SECONDS = 6.0
 
 #: Height of the strip with the name of the run [pixels].
 STRIP = 40
@@ -145,9 +142,7 @@ def draw_stations(comparison: Comparison, path: Path) -> Path:
     page = Image.new("RGB", (pair.size[0], sum(row.height for row in rows)), palette.PAPER)
     for k, row in enumerate(rows):
         page.paste(row, (0, k * row.height))
-    with atomic_file(path) as partial:
-        page.save(partial, format="PNG")
-    return path
+    return save_picture(page, path)
 
 
 def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int, int], None] | None = None) -> Path:
@@ -184,19 +179,19 @@ def _aspect(side: Side) -> float:
 
 def _arrival(side: Side, end: float) -> float:
     """Seconds after which a run is at its last equilibrium."""
-    return SECONDS * side.end / end if end > 0.0 else 0.0
+    return PATH_SECONDS * side.end / end if end > 0.0 else 0.0
 
 
 def _seconds(side: Side, end: float) -> float:
     falls = 0.0 if side.fall is None else PAUSE + float(side.fall.times[-1])
-    return max(_arrival(side, end) + falls, SECONDS)
+    return max(_arrival(side, end) + falls, PATH_SECONDS)
 
 
 def _moment(side: Side, time: float, end: float) -> tuple[str, float]:
     """Give what a run shows at a time of the film: a place on its path, or a moment of its fall."""
     arrival = _arrival(side, end)
     if time < arrival:
-        return "path", end * time / SECONDS
+        return "path", end * time / PATH_SECONDS
     if side.fall is None or time < arrival + PAUSE:
         return "path", side.end
     return "fall", min(time - arrival - PAUSE, float(side.fall.times[-1]))

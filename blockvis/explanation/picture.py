@@ -25,7 +25,7 @@ from blockvis.pictures.drawer import WHOLE, magnified
 from blockvis.pictures.figures import plain_text, saved
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.sight_lines import SightLines
-from blockvis.pictures.solid_view import ABOVE, ALIKE, IN_FRONT, View, hiding_supports, views_from
+from blockvis.pictures.solid_view import ABOVE, IN_FRONT, View, first_alike, hiding_supports, views_from
 from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joint_faces import Rings
 from blockvis.results.joints import carried_faces
@@ -154,8 +154,7 @@ def _view_of(found: Explanation) -> View:
         worths = np.minimum(2.0 * shares, 1.0) + front
         return float(sizes @ worths) / float(sizes.sum()) - (FROM_BELOW if view.above < 0.0 else 0.0)
 
-    values = [worth(view) for view in views]
-    return next(view for view, value in zip(views, values, strict=True) if value >= max(values) - ALIKE)
+    return first_alike(views, worth)
 
 
 def _pieces(rings: Rings) -> np.ndarray:

@@ -18,10 +18,11 @@ from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
 
 from . import palette
+from .film import PATH_SECONDS, PAUSE
 from .swing import shown_increments
 
-#: Seconds in which the path passes, that the last equilibrium and the end stand, and of a frame of pseudo-time.
-PATH, STANDS, FRAME = 6.0, 0.5, 0.1
+#: Seconds of a frame of pseudo-time.
+FRAME = 0.1
 
 #: Seconds between two states at one parameter.
 AT_ONCE = 1e-3
@@ -102,10 +103,10 @@ def _played(
     # Positions of a load may be negative, times may not.
     path, along = response.path, response.parameters - response.parameters[:1]
     reach = float(along[-1]) if path else 0.0
-    times = PATH * along / reach if reach > 0.0 else 0.1 * np.arange(len(path))
+    times = PATH_SECONDS * along / reach if reach > 0.0 else FRAME * np.arange(len(path))
     moments = [(float(time), one.pose, one.ties) for time, one in zip(times, path, strict=True)]
     moments = moments or [(0.0, solver.Pose.initial(response.assembly), mechanics.TieForces())]
-    start, last = moments[-1][0] + STANDS, moments[-1][1:]
+    start, last = moments[-1][0] + PAUSE, moments[-1][1:]
     if fall is not None:
         moments += [
             (start + time, fall.pose(k), fall.ties_at(time, response)) for k, time in enumerate(fall.times.tolist())
@@ -113,7 +114,7 @@ def _played(
     elif frames := [i for i in shown_increments(response) if i.status == solver.Status.FALLING]:
         moments.append((start, *last))
         moments += [(start + FRAME * k, frame.pose, frame.ties) for k, frame in enumerate(frames, start=1)]
-    moments.append((moments[-1][0] + STANDS, *moments[-1][1:]))
+    moments.append((moments[-1][0] + PAUSE, *moments[-1][1:]))
     clock = np.array([time for time, _, _ in moments])
     # What changes between two settlements does so at one parameter; players want times that grow.
     clock += AT_ONCE * np.cumsum(np.diff(clock, prepend=-1.0) <= 1e-6)

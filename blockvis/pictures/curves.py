@@ -26,6 +26,7 @@ from blockvis.results.about import (
     phases_of,
 )
 from blockvis.results.reaction_range import ReactionRange
+from blockvis.results.swinging import SWING
 from blockvis.results.tables import change_words
 from blockvis.results.ties import TieForceCurves, tie_force_curves
 from solver import mechanics
@@ -53,9 +54,6 @@ CURVE_SUFFIXES = (".png", ".svg", ".pdf")
 
 #: Increments have dots where they are no more than this: of more, the dots would be a thick line.
 MOST_DOTS = 25
-
-#: The diagram of one limit load goes so far, as a part of the structure's size: as far as its mechanism is drawn.
-SMALL = 0.05
 
 #: Losses of blocks that have words, the largest.
 MOST_LOSSES = 3
@@ -297,7 +295,7 @@ class _Plot:
     def _single(self) -> None:
         """Draw one limit load: rigid up to it, then a mechanism, over displacements as small as first order allows."""
         axes, text = self.axes, self.text
-        reach = SMALL * float(np.ptp(self.response.assembly.vertices, axis=0).max())
+        reach = SWING * float(np.ptp(self.response.assembly.vertices, axis=0).max())
         factor, unit = (1e3, "mm") if reach < 0.1 else (1.0, "m")
         reach *= factor
         axes.set_xlim(0.0, reach)

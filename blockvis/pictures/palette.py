@@ -56,7 +56,7 @@ PARTS = np.array(
 #: Edges of the blocks and the main cracks in a drawing of cracks, the widest first: red, blue, green,
 #: violet, ochre, teal.
 PALE_OUTLINE = (204, 199, 191)
-SURVEYED = ((190, 30, 30), (20, 92, 168), (46, 125, 50), (126, 55, 178), (184, 110, 0), (0, 121, 125))
+SURVEYED = (WARNING, FORCE, (46, 125, 50), SLIDING, (184, 110, 0), (0, 121, 125))
 #: Of the forces of ties over a settlement; blue is the reaction, and red what fails.
 TIE_SHADES = (*SURVEYED[2:], *SURVEYED[:2])
 
@@ -70,7 +70,7 @@ STILL = 0.45
 SHADE = 0.035
 
 #: Cracks in space, from narrow to wide: all stand out from stone.
-CRACKS = np.array([(244, 162, 97), (226, 78, 27), (122, 16, 16)], dtype=float)
+CRACKS = np.array([(244, 162, 97), OPEN, (122, 16, 16)], dtype=float)
 
 #: Pale to deep indigo, even in lightness, and light enough at its end for outlines to show: no support that moves, and
 #: no arrow on the blocks, has its hue.

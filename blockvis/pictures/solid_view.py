@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -183,6 +184,12 @@ def _above(assembly: solver.Assembly) -> float:
     return ABOVE_LOW if size[2] < LOW * min(size[:2]) else ABOVE
 
 
+def first_alike(views: Sequence[View], worth: Callable[[View], float]) -> View:
+    """Choose the first of views that are worth as much as the best one, but for :data:`ALIKE`."""
+    worths = [worth(view) for view in views]
+    return next(view for view, value in zip(views, worths, strict=True) if value >= max(worths) - ALIKE)
+
+
 def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View] | None = None) -> View:
     """Choose from where the motion of a structure is seen best: across it, and not behind what stands.
 
@@ -204,14 +211,14 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
     centre = weights @ assembly.centroids / weights.sum()
     states = path or response.increments
     lines = SightLines(assembly, states[-1 if path else 0].pose if states else solver.Pose.initial(assembly), weights)
-    seen = [
-        float((volumes * lines.seen(view.axes, n)) @ np.linalg.norm(motion @ view.axes[:2].T, axis=1) / weights.sum())
-        + IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(_size(assembly).max())
-        - FROM_THE_FRONT * float(view.axes[2, 1])
-        for view in views
-    ]
-    best = max(seen)
-    return next(view for view, value in zip(views, seen, strict=True) if value >= best - ALIKE)
+
+    def worth(view: View) -> float:
+        across = np.linalg.norm(motion @ view.axes[:2].T, axis=1)
+        seen = float((volumes * lines.seen(view.axes, n)) @ across / weights.sum())
+        front = IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(_size(assembly).max())
+        return seen + front - FROM_THE_FRONT * float(view.axes[2, 1])
+
+    return first_alike(views, worth)
 
 
 def _scaled(motion: np.ndarray, weights: np.ndarray) -> np.ndarray:

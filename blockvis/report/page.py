@@ -42,6 +42,7 @@ from blockvis.pictures.captions import (
     value_label,
 )
 from blockvis.pictures.drawer import FEW_BLOCKS
+from blockvis.pictures.film import PATH_SECONDS
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.render import check_increments
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
@@ -70,8 +71,8 @@ ERROR_UNKNOWN = "<!-- error not known -->"
 #: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
 MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
 
-#: Seconds the path takes at even settlement, each frame of a fall without time, and the pause before a fall.
-PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
+#: Seconds of each frame of a fall without time, and of the pause before a fall.
+FALL_SECONDS, PAUSE = 0.06, 0.6
 
 #: Length of the longest arrow of the load of a fill, as a part of the larger side of the picture.
 FILL_ARROW = 0.1
