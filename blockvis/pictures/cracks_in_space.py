@@ -77,8 +77,7 @@ class CracksInSpace:
             assembly, self._views, frame, self.sheet, roles, fine=True, cut=plane, outline=palette.PALE_OUTLINE
         )
         self._pair.hide(increment.fallen)
-        every = np.ones(assembly.n_blocks, dtype=bool)
-        self._pair.pose(initial, palette.pale(roles, every, palette.SURVEY))
+        self._pair.pose(initial, palette.pale(roles, True, palette.SURVEY))
         self._draw(limits, colours)
         self.pixel = self._pair.pixel
         texts = [width_text(limit) for limit in limits]
@@ -131,7 +130,7 @@ class CracksInSpace:
             seen_joints.append(opened.joints[seen])
             left += scene.size[0]
         if self._tells_moving and self._pair.holds("moving"):
-            pale = palette.pale(np.array([palette.MOVING]), np.array([True]), palette.SURVEY)
+            pale = palette.pale(np.array([palette.MOVING]), True, palette.SURVEY)
             self.keys.append(Key("area", "moving support", palette.rgb(pale[0])))
         self._pair.close()
         self._seen_joints = np.concatenate(seen_joints)

@@ -111,9 +111,10 @@ def role_colours(assembly: solver.Assembly, settles: bool = True) -> np.ndarray:
     return fill
 
 
-def pale(fill: np.ndarray, blocks: np.ndarray, left: float) -> np.ndarray:
-    """(n_blocks, 3) uint8 array: fills of some blocks, (n_blocks,) bool, with a part of their colour ``left``."""
-    return np.where(blocks[:, None], np.rint(left * fill + (1.0 - left) * np.array(PAPER)), fill).astype(np.uint8)
+def pale(fill: np.ndarray, blocks: np.ndarray | bool, left: float) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills of all blocks, or some (n_blocks,), with a part of their colour ``left``."""
+    paler = np.rint(left * fill + (1.0 - left) * np.array(PAPER))
+    return np.where(np.reshape(blocks, (-1, 1)), paler, fill).astype(np.uint8)
 
 
 def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:

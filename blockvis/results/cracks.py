@@ -59,7 +59,7 @@ MOST_MAIN = 6
 ALIKE = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Crack:
     """A course of joints of the layout that have parted or slid one after another, at least one of them open.
 

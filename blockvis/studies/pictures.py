@@ -185,7 +185,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     shown = list(classes)[:MOST_MECHANISMS]
     width = 8.0 if len(names) == 1 else 2.0 + 3.6 * len(names)
     labels = [textwrap.fill(f"{k + 1}: {one} ({classes[one]})", round(13.5 * width)) for k, one in enumerate(shown)]
-    lines = sum(label.count("\n") + 1 for label in labels) + 2
+    lines = len("\n".join(labels).splitlines()) + 2
     figure = Figure(figsize=(width, 4.6 + 0.2 * lines), layout="constrained")
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     y = factor * outcome(table)
