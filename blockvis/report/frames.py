@@ -24,14 +24,7 @@ from blockvis.results.joints import carried_faces, joint_states
 from blockvis.text import force_text, rounded_length
 from solver import mechanics
 
-from .packing import (
-    FINENESS,
-    FORCE_FINENESS,
-    TOLD_FINENESS,
-    counted_steps,
-    deflated,
-    rounded,
-)
+from .packing import FINENESS, FORCE_FINENESS, TOLD_FINENESS, counted_steps, deflated, rounded
 
 #: How far down blocks go that are taken away, in extents of the structure.
 AWAY = 4.0
@@ -67,9 +60,9 @@ def model_of_frames(
         "told_forces": [FINENESS * largest, TOLD_FINENESS],
         "force_scale": [shown_force, force_text(shown_force)],
         "packed": {
-            "vertices": deflated(rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
-            "centroids": deflated(rounded(assembly.centroids - origin, unit), assembly.n_blocks),
-            "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1), len(joints)),
+            "vertices": deflated(rounded(assembly.vertices - origin, unit)),
+            "centroids": deflated(rounded(assembly.centroids - origin, unit)),
+            "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1)),
             **tables.packed(),
             **_packed_live(live, shown, origin, unit),
         },
@@ -103,9 +96,9 @@ def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndar
     first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
     tails, tips = (rounded(np.concatenate(ends) - origin, unit) for ends in zip(*found, strict=True))
     return {
-        "live_first": deflated(first, len(first)),
-        "live_tail": deflated(tails, first[-1]),
-        "live_tip": deflated(tips, first[-1]),
+        "live_first": deflated(first),
+        "live_tail": deflated(tails),
+        "live_tip": deflated(tips),
     }
 
 
@@ -144,7 +137,7 @@ class FrameTables:
         # The place of a force need not be finer than a pixel; more digits would only fill the file.
         coarse = round(FORCE_FINENESS / FINENESS / 4.0)
         d = assembly.dimension
-        self._n, self._in_space = len(shown), d == 3
+        self._in_space = d == 3
         self._travel, self._turn, self._told = [], [], []
         self._places, self._vectors, self._pairs = (_nothing(n) for n in (d, d, 2))
         self.sizes = [np.zeros(0)]
@@ -179,17 +172,17 @@ class FrameTables:
         forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self._marks))
         marks = np.concatenate(self._marks)
         return {
-            "travel": deflated(np.stack(self._travel), self._n),
-            "turn": deflated(np.stack(self._turn), self._n),
-            "joint_forces": deflated(np.stack(self._told), self._n),
-            "force_first": deflated(forces, len(forces)),
-            "force_place": deflated(np.concatenate(self._places), forces[-1]),
-            "force_vector": deflated(np.concatenate(self._vectors), forces[-1]),
-            "force_blocks": deflated(np.concatenate(self._pairs), forces[-1]),
-            "mark_first": deflated(found, len(found)),
-            "mark_place": deflated(np.concatenate(self._mark_places), found[-1]),
-            "mark_kind": deflated(marks[:, 0], found[-1]),
-            **({"mark_joint": deflated(marks[:, 1], found[-1])} if self._in_space else {}),
+            "travel": deflated(np.stack(self._travel)),
+            "turn": deflated(np.stack(self._turn)),
+            "joint_forces": deflated(np.stack(self._told)),
+            "force_first": deflated(forces),
+            "force_place": deflated(np.concatenate(self._places)),
+            "force_vector": deflated(np.concatenate(self._vectors)),
+            "force_blocks": deflated(np.concatenate(self._pairs)),
+            "mark_first": deflated(found),
+            "mark_place": deflated(np.concatenate(self._mark_places)),
+            "mark_kind": deflated(marks[:, 0]),
+            **({"mark_joint": deflated(marks[:, 1])} if self._in_space else {}),
         }
 
 

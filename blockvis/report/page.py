@@ -314,8 +314,8 @@ def _model_in_plane(response: solver.Response, shown: list[solver.Increment], gr
     origin, unit = np.array(model["origin"]), model["unit"]
     extent = float(np.subtract(model["bounds"][2:], model["bounds"][:2]).max())
     own = {
-        "offsets": deflated(assembly.offsets, len(assembly.offsets)),
-        "joint_ends": deflated(rounded(joints.ends - origin, unit), len(joints)),
+        "offsets": deflated(assembly.offsets),
+        "joint_ends": deflated(rounded(joints.ends - origin, unit)),
     }
     return model | {
         "ground": None if ground is None else float(ground - origin[1]),
