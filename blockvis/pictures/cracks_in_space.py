@@ -109,41 +109,40 @@ class CracksInSpace:
         The numbers are those of the report. Of a crack whose widest place is hidden that is the widest one that some
         view shows.
         """
-        page, left = self._pair.image(), 0
-        opened, slid = self._opened, self._slid
-        found: dict[int, tuple[float, np.ndarray]] = {}
-        slipped: tuple[float, np.ndarray] = 0.0, np.zeros(2)
-        dots, seen_joints = [], []
-        for scene in self._pair.scenes:
-            offset, thin = np.array([left, 0]), THIN * scene.usual_height
-            seen, pixels = ~scene.hides(opened.middles, thin), scene.at_pixel(opened.middles) + offset
-            for crack, number in zip(cracks, numbers, strict=True):
-                here = seen & np.isin(opened.joints, crack.joints)
-                widest = int(np.where(here, opened.openings, -1.0).argmax()) if len(here) else 0
-                if here.any() and (number not in found or opened.openings[widest] > found[number][0]):
-                    found[number] = opened.openings[widest], pixels[widest]
-            slides, along = ~scene.hides(slid.middles, thin), scene.at_pixel(slid.middles) + offset
-            slips = np.where(slides, self._slips, 0.0)
-            if slips.max(initial=0.0) > slipped[0]:
-                slipped = float(slips.max()), along[slips.argmax()]
-            dots += [pixels[seen], along[slides]]
-            seen_joints.append(opened.joints[seen])
-            left += scene.size[0]
+        page, opened, labels, places = self._pair.image(), self._opened, list[str](), list[np.ndarray]()
+        seen, pixels = self._in_views(opened.middles)
+        slides, along = self._in_views(self._slid.middles)
+        joints, openings, slips = (
+            np.tile(of, len(self._views)) for of in (opened.joints, opened.openings, self._slips)
+        )
+        self._seen_joints = joints[seen]
+        for crack, number in zip(cracks, numbers, strict=True):
+            own = np.where(seen & np.isin(joints, crack.joints), openings, 0.0)
+            if own.any():
+                labels.append(f"{number}: {width_text(crack.width)}")
+                places.append(pixels[own.argmax()])
+        colours = [palette.OPEN] * len(labels)
+        slips = np.where(slides, slips, 0.0)
+        if slips.any():
+            labels.append(f"slip {width_text(float(slips.max()))}")
+            places.append(along[slips.argmax()])
+            colours.append(palette.SLIDING)
         if self._tells_moving and self._pair.holds("moving"):
             pale = palette.pale(np.array([palette.MOVING]), True, palette.SURVEY)
             self.keys.append(Key("area", "moving support", palette.rgb(pale[0])))
         self._pair.close()
-        self._seen_joints = np.concatenate(seen_joints)
-        labelled = [(crack, n) for crack, n in zip(cracks, numbers, strict=True) if n in found]
-        labels = [f"{n}: {width_text(crack.width)}" for crack, n in labelled]
-        places, colours = [found[n][1] for _, n in labelled], [palette.OPEN] * len(labelled)
-        if slipped[0] > 0.0:
-            labels.append(f"slip {width_text(slipped[0])}")
-            places.append(slipped[1])
-            colours.append(palette.SLIDING)
-        if labels:
-            write_labels(page, np.array(places), labels, self.sheet.text, np.concatenate(dots), colours)
+        dots = np.concatenate([pixels[seen], along[slides]])
+        write_labels(page, np.array(places).reshape(-1, 2), labels, self.sheet.text, dots, colours)
         return page
+
+    def _in_views(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whether the last image shows points (n, 3) [m] of lines, and at which pixels; one view after another."""
+        seen, pixels, left = [], [], 0
+        for scene in self._pair.scenes:
+            seen.append(~scene.hides(points, THIN * scene.usual_height))
+            pixels.append(np.add(scene.at_pixel(points), (left, 0)))
+            left += scene.size[0]
+        return np.concatenate(seen), np.concatenate(pixels)
 
 
 @dataclass(frozen=True)
