@@ -55,7 +55,8 @@ INK, FAINT, OPEN, OUTLINE, FORCE, WARNING, SETTLEMENT = (
 WIDE = 4.0
 
 #: Pixels of matplotlib per inch, and of the blocks in space.
-DPI, FINE = 130, 260
+DPI = 130
+FINE = 2 * DPI
 
 #: What it costs to look from below, beside having the cracks, and what has moved far, in front by the size of the
 #: structure, and seeing all of them.
