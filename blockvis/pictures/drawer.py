@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -62,8 +63,8 @@ if TYPE_CHECKING:
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
 
-#: Something falls where a corner moves by more pixels than this in so many seconds: the badge says so.
-VISIBLE, MOMENT = 1.0, 0.12
+#: Something falls where a corner moves by more than a pixel in so many seconds: the badge says so.
+MOMENT = 0.12
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
@@ -220,7 +221,6 @@ class Drawer:
         self._drawn_at: solver.Pose | None = None
         #: Ends (n, 2, d) [m] of the arrows in the picture, by layer: labels leave them free.
         self._arrows: dict[str, np.ndarray] = {}
-        self._keys: list[Key] | None = None
 
     def _chosen_views(self) -> tuple[View, ...]:
         """Find from where blocks in space are drawn; films have one view."""
@@ -411,7 +411,7 @@ class Drawer:
         start = max(min(time, end - MOMENT), 0.0)
         # Until the end: what is tall begins to fall slower than is seen in a moment.
         now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (start, end))
-        return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > VISIBLE * self.scene.pixel)
+        return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > self.scene.pixel)
 
     def show_motion(self, swing: Swing) -> None:
         """Show by tints, edges and arrows how the parts of a mechanism move.
@@ -455,30 +455,27 @@ class Drawer:
         _, first = np.unique(cell, axis=0, return_index=True)
         return [moves[[k]] for k in first]
 
+    @cached_property
     def keys(self) -> list[Key]:
         """Return what is marked in any of the increments, what comes and goes first."""
-        if self._keys is None:
-            keys = self._keys_of_tints()
-            if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
-                keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
-            keys += [*self._keys_of_joints(), *self.ties.keys()]
-            if not self._flat and self.response.settlements:
-                traced = hiding_supports(self.assembly, self._views[0])[self.assembly.moving].all()
-                keys.append(Key("line" if traced else "area", "moving support", palette.MOVING, layers=("moving",)))
-            if self.response.loads.fills:
-                kind = "area" if self._flat else "line"
-                keys.append(
-                    Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
-                )
-            if self.live.largest > 0.0:
-                keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
-            if self._drawn_at is not None:
-                layers = ("motion outline", "motion top")
-                what = "motion" if self._flat else "motion, blocks drawn after it"
-                keys.append(Key("line", f"{what} (not to scale)", palette.SETTLEMENT, layers=layers))
-                keys.append(Key("line", "at equilibrium", palette.GHOST, layers=("before",)))
-            self._keys = [*keys, *self._keys_of_forces()]
-        return self._keys
+        keys = self._keys_of_tints()
+        if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
+            keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
+        keys += [*self._keys_of_joints(), *self.ties.keys()]
+        if not self._flat and self.response.settlements:
+            traced = hiding_supports(self.assembly, self._views[0])[self.assembly.moving].all()
+            keys.append(Key("line" if traced else "area", "moving support", palette.MOVING, layers=("moving",)))
+        if self.response.loads.fills:
+            kind = "area" if self._flat else "line"
+            keys.append(Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",)))
+        if self.live.largest > 0.0:
+            keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
+        if self._drawn_at is not None:
+            layers = ("motion outline", "motion top")
+            what = "motion" if self._flat else "motion, blocks drawn after it"
+            keys.append(Key("line", f"{what} (not to scale)", palette.SETTLEMENT, layers=layers))
+            keys.append(Key("line", "at equilibrium", palette.GHOST, layers=("before",)))
+        return [*keys, *self._keys_of_forces()]
 
     def _keys_of_joints(self) -> list[Key]:
         marks, widest = self._seen.marks, self._seen.widest
@@ -521,10 +518,10 @@ class Drawer:
         falling = increment.status == solver.Status.FALLING
         untinted = [] if self._acts(increment) else self._keys_of_tints()
         if not (increment.fallen & ~increment.removed).any():
-            untinted += [key for key in self.keys() if key.text == LOST]
+            untinted += [key for key in self.keys if key.text == LOST]
         return [
             key
-            for key in self.keys()
+            for key in self.keys
             if key not in untinted and (self.scene.holds(*key.layers) if key.layers else bool(key.kind) or not falling)
         ]
 

@@ -385,11 +385,8 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
         caption = caption.replace("   ·   ", "  ·  ")
         told = {"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase}
         fell_at = increment.state.fell_at
-        lost = {
-            "gone": np.flatnonzero(~np.isnan(fell_at)).tolist(),
-            "lost": np.flatnonzero(np.isfinite(fell_at)).tolist(),
-        }
-        frames.append(told | lost)
+        gone, lost = (np.flatnonzero(of).tolist() for of in (~np.isnan(fell_at), np.isfinite(fell_at)))
+        frames.append({**told, "gone": gone, "lost": lost})
     return frames
 
 
