@@ -31,10 +31,6 @@ SMALLEST_RESULTANT = 2e-3
 #: middle: where mortar is bent or sheared, it crosses the line of the joint far off, or nowhere.
 BESIDE = 2.0
 
-#: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
-#: the last digit leaves slivers otherwise.
-SLIVER = 0.01
-
 #: Joints open by less than this fraction of the block size are drawn half as wide.
 FINE_CRACK = 0.01
 
@@ -66,7 +62,8 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
     them.
     """
     edges = [np.zeros((0, 2, 2))]
-    margin = SLIVER * assembly.block_size
+    # Grown, merged and shrunk back: between faces that touch, the last digit leaves slivers otherwise.
+    margin = 0.01 * assembly.block_size
     for part in range(int(parts.max(initial=-1)) + 1):
         blocks = np.flatnonzero(parts == part)
         outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
