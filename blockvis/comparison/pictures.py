@@ -36,12 +36,6 @@ from .compared import Comparison, Side
 #: Colours and lines of the two curves, told apart without colour, too.
 COLOURS, LINES = (palette.FORCE, palette.OPEN), ("-", "--")
 
-#: Usual width and height of the picture of one run [pixels], beside that of the other or, of wide structures, below it.
-TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
-
-#: Structures wider than this for their height stand below each other.
-WIDE = 2.5
-
 #: Height of the strip with the name of the run [pixels].
 STRIP = 40
 
@@ -87,8 +81,9 @@ class Pair:
 
     def __init__(self, comparison: Comparison, look: Look, stations: np.ndarray | None = None) -> None:
         self.sides, self._longest = comparison.sides, comparison.longest
-        self._below = all(_aspect(side) > WIDE for side in self.sides)
-        usual, across = (WIDE_PANEL, 1) if self._below else (TALL_PANEL, 2)
+        # Wide structures stand below each other.
+        self._below = all(_aspect(side) > 2.5 for side in self.sides)
+        usual, across = ((1280, 480), 1) if self._below else ((800, 620), 2)
         in_space = all(side.response.assembly.dimension == 3 for side in self.sides)
         self.drawers: list[Drawer] = []
         for side in self.sides:

@@ -23,9 +23,8 @@ from .sight_lines import SightLines
 from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, section_words, views_of
 from .swing import swing_of
 
-#: Widths between the classes are of these, times a power of ten [mm]; most classes; thinnest and thickest line in
-#: heights of the picture.
-STEPS, MOST_CLASSES, THIN, THICK = (1.0, 2.0, 5.0), 4, 1.0 / 360.0, 1.0 / 100.0
+#: Thinnest and thickest line, in heights of the picture.
+THIN, THICK = 1.0 / 360.0, 1.0 / 100.0
 
 #: An edge is drawn in so many pieces: its opening changes from end to end.
 PIECES = 6
@@ -216,7 +215,7 @@ def _showing(
 
 
 def class_limits(widest: float) -> list[float]:
-    """List the widths [m] that part the classes of cracks up to a widest [m]: round numbers, the last below it.
+    """List the widths [m] that part the four classes of cracks up to a widest [m]: round numbers, the last below it.
 
     Examples
     --------
@@ -224,5 +223,5 @@ def class_limits(widest: float) -> list[float]:
     [0.02, 0.05, 0.1]
     """
     power = 10.0 ** np.floor(np.log10(widest)) if widest > 0.0 else 1.0
-    every = [step * factor * power for factor in (0.01, 0.1, 1.0) for step in STEPS]
-    return [float(f"{limit:.3g}") for limit in every if limit < 0.999 * widest][-(MOST_CLASSES - 1) :] if widest else []
+    every = [step * factor * power for factor in (0.01, 0.1, 1.0) for step in (1.0, 2.0, 5.0)]
+    return [float(f"{limit:.3g}") for limit in every if limit < 0.999 * widest][-3:] if widest else []

@@ -21,24 +21,14 @@ from .surface import left_blocks
 AROUND = (-60.0, -30.0, -120.0, -150.0, 30.0, 60.0, 120.0, 150.0)
 ABOVE = 24.0
 
-#: Degrees above the level for what is lower than this part of its smaller side in plan: slabs and floors.
-LOW, ABOVE_LOW = 0.35, 38.0
-
-#: What it is worth to have what moves in front, beside seeing all of its motion; and to look from the front, along y.
-IN_FRONT, FROM_THE_FRONT = 0.35, 0.04
+#: What it is worth to have what moves in front, beside seeing all of its motion.
+IN_FRONT = 0.35
 
 #: Directions in which a motion is seen as well as in the best one, within this part, are equal.
 ALIKE = 0.02
 
-#: Degrees above the level for what a level plane cuts; other planes are seen from where at least this cosine of the
-#: angle to their normal is left.
-ABOVE_CUT, ACROSS = 50.0, 0.6
-
-#: Structures have an intrados where so large a part of their plan hangs over air.
-OVER_AIR = 0.4
-
-#: Supports that hide more of a structure than this, seen from below, are drawn by their edges.
-HIDING = 0.12
+#: Planes that cut are seen from where at least this cosine of the angle to their normal is left; level ones from above.
+ACROSS = 0.6
 
 
 @dataclass(frozen=True)
@@ -74,7 +64,7 @@ def views_of(
     """
     sight = sight or Sight(both=cut is None and has_intrados(response.assembly, joints))
     level = cut is not None and abs(cut.normal[2]) > ACROSS
-    above = ABOVE_CUT if level else _above(response.assembly)
+    above = 50.0 if level else _above(response.assembly)
     views = views_from(sight, above)
     if sight.azimuth is None and cut is not None and not level:
         facing = [abs(float(view.axes[2] @ cut.normal)) for view in views]
@@ -101,7 +91,7 @@ def has_intrados(assembly: solver.Assembly, joints: InitialJoints) -> bool:
     lower = np.where(plan > 0.0, joints.block_b, joints.block_a)
     down -= float(np.abs(plan)[free[upper]].sum())
     up -= float(np.abs(plan)[free[lower]].sum())
-    return down > OVER_AIR * up > 0.0
+    return down > 0.4 * up > 0.0
 
 
 def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
@@ -113,7 +103,7 @@ def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
     whole = shapely.MultiPoint(flat[assembly.free[owner]]).convex_hull
     for block in np.flatnonzero(~assembly.free).tolist():
         shadow = shapely.MultiPoint(flat[owner == block]).convex_hull
-        hides[block] = shadow.intersection(whole).area > HIDING * whole.area
+        hides[block] = shadow.intersection(whole).area > 0.12 * whole.area
     return hides
 
 
@@ -181,7 +171,8 @@ def _size(assembly: solver.Assembly) -> np.ndarray:
 def _above(assembly: solver.Assembly) -> float:
     """Degrees above the level from which a structure is seen by default."""
     size = _size(assembly)
-    return ABOVE_LOW if size[2] < LOW * min(size[:2]) else ABOVE
+    # Slabs and floors from higher.
+    return 38.0 if size[2] < 0.35 * min(size[:2]) else ABOVE
 
 
 def first_alike(views: Sequence[View], worth: Callable[[View], float]) -> View:
@@ -216,7 +207,8 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
         across = np.linalg.norm(motion @ view.axes[:2].T, axis=1)
         seen = float((volumes * lines.seen(view.axes, n)) @ across / weights.sum())
         front = IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(_size(assembly).max())
-        return seen + front - FROM_THE_FRONT * float(view.axes[2, 1])
+        # To look from the front, along y, is worth a little.
+        return seen + front - 0.04 * float(view.axes[2, 1])
 
     return first_alike(views, worth)
 

@@ -26,9 +26,6 @@ from solver import mechanics
 
 from .packing import FINENESS, FORCE_FINENESS, TOLD_FINENESS, counted_steps, deflated, rounded
 
-#: How far down blocks go that are taken away, in extents of the structure.
-AWAY = 4.0
-
 
 def model_of_frames(
     response: solver.Response, joints: InitialJoints, shown: list[solver.Increment], held: np.ndarray
@@ -139,7 +136,7 @@ def _tables(
     for increment in shown:
         moved = increment.pose.displacements(assembly)
         # What was taken away goes out of the picture.
-        moved[increment.removed, d - 1] -= AWAY * unit / FINENESS
+        moved[increment.removed, d - 1] -= 4.0 * unit / FINENESS
         states, told = joint_states(assembly, joints, increment), slice(len(joints))
         carried = np.stack([states.normal_force[told], states.shear_force[told]], axis=1)
         points, forces, pairs = resultants(increment)

@@ -74,14 +74,8 @@ MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
 #: Seconds of each frame of a fall without time, and of the pause before a fall.
 FALL_SECONDS, PAUSE = 0.06, 0.6
 
-#: Length of the longest arrow of the load of a fill, as a part of the larger side of the picture.
-FILL_ARROW = 0.1
-
 #: How the picture of blocks in space is turned and moved.
 TURNING = "the mouse or Shift with the arrows turns the picture, the mouse with Shift moves it"
-
-#: Crack lines that the table of the page lists.
-LISTED_CRACKS = 8
 
 
 @dataclass(frozen=True)
@@ -218,7 +212,7 @@ def _cracks(response: solver.Response) -> str:
         return ""
     last = response.path[-1]
     cracks = cracks_of(response.assembly, last.pose, last.fallen)
-    return _table("Cracks at the last equilibrium", "crack-lines", crack_rows(cracks, LISTED_CRACKS))
+    return _table("Cracks at the last equilibrium", "crack-lines", crack_rows(cracks, 8))
 
 
 def _table(title: str, name: str, rows: Sequence[Sequence[str]]) -> str:
@@ -319,7 +313,7 @@ def _model_in_plane(response: solver.Response, shown: list[solver.Increment], gr
     }
     return model | {
         "ground": None if ground is None else float(ground - origin[1]),
-        "fill": _fill(response, shown, origin, FILL_ARROW * extent),
+        "fill": _fill(response, shown, origin, 0.1 * extent),
         "packed": model["packed"] | own,
     }
 
