@@ -111,7 +111,8 @@ class SolidScene(Scene):
         self.edges = sharp_edges(assembly.polyhedra)
         traced = self._outlined[assembly.block_of_vertex[self.edges[:, 0]]]
         self._edges, self._traces = (
-            pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges[of])) for of in (~traced, traced)
+            pv.PolyData(np.array(assembly.vertices), lines=pv.CellArray.from_regular_cells(self.edges[of]))
+            for of in (~traced, traced)
         )
         self._shadow: pv.PolyData | None = None
         # Height of the ground of a fall, vertices of supports, and those under what stands on it.
@@ -199,7 +200,7 @@ class SolidScene(Scene):
         points = np.asarray(ends, dtype=float).reshape(-1, 3)
         self.clear(layer)
         if len(points):
-            mesh = pv.PolyData(points, lines=_line_cells(np.arange(len(points)).reshape(-1, 2)))
+            mesh = pv.PolyData(points, lines=pv.CellArray.from_regular_cells(np.arange(len(points)).reshape(-1, 2)))
             self._add(layer, mesh, colour, width=width, forward=forward)
 
     def polygons(
@@ -502,10 +503,6 @@ def _feet(assembly: solver.Assembly) -> np.ndarray:
     upwards = shapes.faces(shapes.vertices).normals[shapes.face_of_corner, 2]
     down, up = (np.unique(shapes.corners[way * upwards > 0.5]) for way in (-1.0, 1.0))
     return np.setdiff1d(down[ground[owner[down]]], up)
-
-
-def _line_cells(ends: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.full(len(ends), 2), ends]).ravel()
 
 
 def _plotter(size: tuple[int, int]) -> pv.Plotter:
