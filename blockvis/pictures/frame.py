@@ -416,11 +416,8 @@ class Frame:
     def holding(self, points: np.ndarray) -> Frame:
         """Grow the frame where points (n, 2) [m] lie beyond it, with a margin."""
         margin = 0.02 * float(self.size.max())
-        if len(points) == 0:
-            return self
-        return Frame(
-            np.minimum(self.low, points.min(axis=0) - margin), np.maximum(self.high, points.max(axis=0) + margin)
-        )
+        low, high = points.min(axis=0, initial=np.inf) - margin, points.max(axis=0, initial=-np.inf) + margin
+        return Frame(np.minimum(self.low, low), np.maximum(self.high, high))
 
     def fitted(self, width: int, height: int) -> Frame:
         """Grow the frame to the proportions of a picture of ``width`` × ``height`` pixels."""

@@ -193,7 +193,8 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
     if path:
         # What supports do before counts like the mechanism.
         moved = path[-1].pose.positions - assembly.centroids
-        motion = _scaled(motion, weights) + _scaled(moved, volumes * np.linalg.norm(moved, axis=1))
+        ways = volumes * np.linalg.norm(moved, axis=1)
+        motion = motion / (weights.sum() or 1.0) + moved / (ways.sum() or 1.0)
         weights = volumes * np.linalg.norm(motion, axis=1)
     views = views or [View(around, _above(assembly)) for around in AROUND]
     if not weights.any():
@@ -211,10 +212,6 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
         return seen + front - 0.04 * float(view.axes[2, 1])
 
     return first_alike(views, worth)
-
-
-def _scaled(motion: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    return motion / weights.sum() if weights.any() else np.zeros_like(motion)
 
 
 def showing_faces(shapes: mechanics.Polyhedra, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

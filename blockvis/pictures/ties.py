@@ -73,9 +73,8 @@ class DrawnTies:
 
     def survey(self, increment: solver.Increment) -> None:
         """Take note of what ties do at an increment, for the legend."""
-        if self._ties:
-            kinds = [tie.kind for tie in self._ties]
-            self.seen |= set(zip(self._states(increment).tolist(), kinds, strict=True))
+        kinds = [tie.kind for tie in self._ties]
+        self.seen |= set(zip(self._states(increment).tolist(), kinds, strict=True))
 
     def ends(self, poses: Sequence[solver.Pose]) -> np.ndarray:
         """(n, d) array [m]: where the ends are at poses."""
