@@ -107,6 +107,7 @@ def draw_curve(
         _draw_ties(below, response, ties)
         axes.set_xlabel("")
     name += "" if band is None else f"   ·   band: range of {mechanics.counted(band.runs.max(initial=0), 'run')}"
+    # Lines of eleven letters an inch.
     above = _mark_phases(axes, response, int(11.0 * size[0])) if phases_of(response) else 0.0
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK), pad=6.0 + above)
     return saved(figure, path, 200)

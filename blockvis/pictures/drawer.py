@@ -160,6 +160,7 @@ class Drawer:
         self._plane = plane_of(assembly, look.cut, self._views[0] if self._views else None)
         self.ties = DrawnTies(response, self._plane)
         numbers = np.array([k for k, i in enumerate(increments) if matters(i, response)], dtype=int)
+        # A hundred states are enough for the scale of the forces.
         self._seen = _Series(sampled=frozenset(evenly(numbers, 100).tolist()))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))

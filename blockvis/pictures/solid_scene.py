@@ -501,6 +501,7 @@ def _feet(assembly: solver.Assembly) -> np.ndarray:
     np.minimum.at(lowest, owner, heights)
     ground = ~assembly.free & (lowest < lowest[assembly.free].min(initial=np.inf))
     upwards = shapes.faces(shapes.vertices).normals[shapes.face_of_corner, 2]
+    # Faces that are rather level than upright.
     down, up = (np.unique(shapes.corners[way * upwards > 0.5]) for way in (-1.0, 1.0))
     return np.setdiff1d(down[ground[owner[down]]], up)
 
