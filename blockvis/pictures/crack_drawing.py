@@ -71,12 +71,10 @@ def draw_cracks(
 
         thickness = "the widest "
         drawing = CracksInSpace(response, increment, joints, size, cracks, *seen_from(view, section))
-        sheet = drawing.sheet
-        shown = drawing.left_by_section(cracks)
-        main = main_cracks(shown)
-        picture = drawing.image(main, [1 + cracks.index(crack) for crack in main])
+        # What it hides is known when it is drawn.
+        picture = drawing.image()
+        sheet, shown, hidden = drawing.sheet, drawing.shown, drawing.hidden
         keys, pixel, slip, drawn, cut_at = drawing.keys, drawing.pixel, drawing.slip, "", drawing.section
-        hidden = len(drawing.hidden(shown))
     lost = loss_words(increment)
     none = f"no joint {'of what stands ' * bool(lost)}is open" + (
         "" if response.parameter.is_path else ": a limit load is of the layout as it stands"

@@ -63,7 +63,11 @@ class CracksInSpace:
         self._slid = edges.chosen(slides & (heights_over(plane, edges.middles) >= 0.0))
         self._slips = np.abs(moved[self._slid.joints, 1])
         self.slip = float(self._slips.max(initial=0.0))
-        self._seen_joints = np.zeros(0, dtype=int)
+        #: The cracks of which the section leaves something, and how many of them no view of the last image shows.
+        self.shown = [crack for crack in cracks if np.isin(crack.joints, self._opened.joints).any()]
+        self.hidden = 0
+        # The numbers are those of the report.
+        self._main = [(1 + cracks.index(crack), crack) for crack in main_cracks(self.shown)]
         limits = class_limits(float(self._opened.openings.max(initial=0.0)))
         colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
         self._tells_moving = bool(response.settlements)
@@ -87,14 +91,6 @@ class CracksInSpace:
         if len(self._slid.joints):
             self.keys.append(Key("line", "sliding joint", palette.SLIDING))
 
-    def left_by_section(self, cracks: Sequence[Crack]) -> list[Crack]:
-        """Choose the cracks of which the section leaves something."""
-        return [crack for crack in cracks if np.isin(crack.joints, self._opened.joints).any()]
-
-    def hidden(self, cracks: Sequence[Crack]) -> list[Crack]:
-        """Choose the cracks of which the views of the last image show nothing."""
-        return [crack for crack in cracks if not np.isin(crack.joints, self._seen_joints).any()]
-
     def _draw(self, limits: Sequence[float], colours: Sequence[tuple[int, int, int]]) -> None:
         height, which = self._pair.usual_height, np.searchsorted(limits, self._opened.openings)
         for k, colour in enumerate(colours):
@@ -102,11 +98,10 @@ class CracksInSpace:
             self._pair.lines(f"crack/{k}", self._opened.ends[which == k], colour, thick, 2.0 + k)
         self._pair.lines("sliding", self._slid.ends, palette.SLIDING, height * (THIN + THICK) / 2.0, 1.5)
 
-    def image(self, cracks: Sequence[Crack], numbers: Sequence[int]) -> Image.Image:
-        """Draw the views, with number and largest width of each crack in the view that shows its widest place.
+    def image(self) -> Image.Image:
+        """Draw the views, with number and largest width of each main crack in the view that shows its widest place.
 
-        The numbers are those of the report. Of a crack whose widest place is hidden that is the widest one that some
-        view shows.
+        Of a crack whose widest place is hidden that is the widest one that some view shows.
         """
         page, opened, labels, places = self._pair.image(), self._opened, list[str](), list[np.ndarray]()
         seen, pixels = self._in_views(opened.middles)
@@ -114,8 +109,8 @@ class CracksInSpace:
         joints, openings, slips = (
             np.tile(of, len(self._views)) for of in (opened.joints, opened.openings, self._slips)
         )
-        self._seen_joints = joints[seen]
-        for crack, number in zip(cracks, numbers, strict=True):
+        self.hidden = sum(not np.isin(crack.joints, joints[seen]).any() for crack in self.shown)
+        for number, crack in self._main:
             own = np.where(seen & np.isin(joints, crack.joints), openings, 0.0)
             if own.any():
                 labels.append(f"{number}: {width_text(crack.width)}")
