@@ -125,15 +125,15 @@ class Pair:
         title = state_text(state, self.sides[k].response, self._longest)
         return self.drawers[k].picture(state, title=title, widths=widths)
 
-    def at(self, parameter: float, *, widths: bool = False) -> Image.Image:
-        """Draw both at a parameter over all phases [m or rad], and write the widths of the main cracks if asked to."""
-        return self.picture([self.path_picture(k, parameter, widths=widths) for k in (0, 1)])
+    def at(self, parameter: float) -> Image.Image:
+        """Draw both at a parameter over all phases [m or rad], with the widths of the main cracks."""
+        return self.picture([self.path_picture(k, parameter, widths=True) for k in (0, 1)])
 
 
 def draw_stations(comparison: Comparison, path: Path) -> Path:
     """Draw both at the same settlements, one row below the other."""
     pair = Pair(comparison, Look(forces="none"), comparison.stations)
-    rows = [pair.at(at, widths=True) for at in comparison.stations.tolist()]
+    rows = [pair.at(at) for at in comparison.stations.tolist()]
     page = Image.new("RGB", (pair.size[0], sum(row.height for row in rows)), palette.PAPER)
     for k, row in enumerate(rows):
         page.paste(row, (0, k * row.height))
@@ -151,18 +151,16 @@ def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int,
     count = max(2, int(np.ceil((longest + PAUSE + END) * RATE)))
 
     def pictures() -> Iterator[Image.Image]:
-        last: list[Image.Image | None] = [None, None]
-        shown: list[object] = [None, None]
+        last: dict[int, tuple[object, Image.Image]] = {}
         for frame in range(count):
-            time = frame / RATE
             for k, side in enumerate(comparison.sides):
-                what, at = moment = _moment(side, time, end)
-                if moment != shown[k] or last[k] is None:
-                    last[k] = pair.drawers[k].falling_picture(at) if what == "fall" else pair.path_picture(k, at)
-                    shown[k] = moment
+                what, at = moment = _moment(side, frame / RATE, end)
+                if k not in last or last[k][0] != moment:
+                    falls = what == "fall"
+                    last[k] = moment, pair.drawers[k].falling_picture(at) if falls else pair.path_picture(k, at)
             if progress is not None:
                 progress(frame + 1, count)
-            yield pair.picture([image for image in last if image is not None])
+            yield pair.picture([image for _, image in last.values()])
 
     return write_film(pictures(), path, size=pair.size, fps=RATE)
 
