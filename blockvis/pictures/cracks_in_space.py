@@ -68,8 +68,6 @@ class CracksInSpace:
         self.hidden = 0
         # The numbers are those of the report.
         self._main = [(1 + cracks.index(crack), crack) for crack in main_cracks(self.shown)]
-        limits = class_limits(float(self._opened.openings.max(initial=0.0)))
-        colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
         self._tells_moving = bool(response.settlements)
         roles = palette.role_colours(assembly, self._tells_moving)
         initial = solver.Pose.initial(assembly)
@@ -81,22 +79,24 @@ class CracksInSpace:
         )
         self._pair.hide(increment.fallen)
         self._pair.pose(initial, palette.pale(roles, True, palette.SURVEY))
-        self._draw(limits, colours)
-        self.pixel = self._pair.pixel
+        self.pixel, self.keys = self._pair.pixel, self._drawn()
+
+    def _drawn(self) -> list[Key]:
+        """Draw lines where joints have opened, in their classes, and where they slide; returns the legend."""
+        limits = class_limits(float(self._opened.openings.max(initial=0.0)))
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]
-        self.keys = [Key("line", text, colour) for text, colour in zip(words, colours, strict=True)]
-        if not len(self._opened.joints):
-            self.keys = []
-        if len(self._slid.joints):
-            self.keys.append(Key("line", "sliding joint", palette.SLIDING))
-
-    def _draw(self, limits: Sequence[float], colours: Sequence[tuple[int, int, int]]) -> None:
         height, which = self._pair.usual_height, np.searchsorted(limits, self._opened.openings)
-        for k, colour in enumerate(colours):
-            thick = height * (THIN + k / max(len(colours) - 1, 1) * (THICK - THIN))
-            self._pair.lines(f"crack/{k}", self._opened.ends[which == k], colour, thick, 2.0 + k)
+        keys = [
+            Key("line", text, palette.rgb(colour))
+            for text, colour in zip(words, palette.crack_colours(len(words)), strict=True)
+        ]
+        for k, key in enumerate(keys):
+            thick = height * (THIN + k / max(len(keys) - 1, 1) * (THICK - THIN))
+            self._pair.lines(f"crack/{k}", self._opened.ends[which == k], key.colour, thick, 2.0 + k)
         self._pair.lines("sliding", self._slid.ends, palette.SLIDING, height * (THIN + THICK) / 2.0, 1.5)
+        sliding = [Key("line", "sliding joint", palette.SLIDING)] * bool(len(self._slid.joints))
+        return keys * bool(len(self._opened.joints)) + sliding
 
     def image(self) -> Image.Image:
         """Draw the views, with number and largest width of each main crack in the view that shows its widest place.
