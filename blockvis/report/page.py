@@ -48,7 +48,7 @@ from blockvis.pictures.render import check_increments
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
 from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of, phases_of
-from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
+from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, last_cracks
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
 from blockvis.results.ties import tie_courses, tie_force_curves, tie_texts
@@ -168,6 +168,7 @@ def report_html(
     origin = about(response)
     model = _model(response, fall, band) | {"name": origin.name}
     data = json.dumps(model, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+    cracks = _table("Cracks at the last equilibrium", "crack-lines", crack_rows(last_cracks(response), 8))
     failed, in_space = response.stop is solver.Status.SOLVER_FAILED, response.assembly.dimension == 3
     return Template(_part("player.html")).substitute(
         title=html.escape(title or " · ".join(filter(None, (origin.name, headline_of(response))))),
@@ -179,7 +180,7 @@ def report_html(
         script=_part("player.js").replace("  // SCENE\n", _part("space.js" if in_space else "plane.js")),
         turning=TURNING if in_space else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
-        cracks=_cracks(response) + _table("Ties and props", "ties", tie_rows(response)),
+        cracks=cracks + _table("Ties and props", "ties", tie_rows(response)),
         certificate=html_rows(certificate_rows(response)),
         error=_error(error) + html_rows(range_rows(band)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
@@ -204,15 +205,6 @@ def _notes(response: solver.Response) -> str:
     """List the notes of the run."""
     items = "".join(f"<li>{html.escape(note)}</li>" for note in dict.fromkeys(response.notes))
     return f'<h2>Notes</h2><ul id="notes">{items}</ul>' if items else ""
-
-
-def _cracks(response: solver.Response) -> str:
-    """List the crack lines of the last equilibrium."""
-    if not response.path:
-        return ""
-    last = response.path[-1]
-    cracks = cracks_of(response.assembly, last.pose, last.fallen)
-    return _table("Cracks at the last equilibrium", "crack-lines", crack_rows(cracks, 8))
 
 
 def _table(title: str, name: str, rows: Sequence[Sequence[str]]) -> str:

@@ -25,7 +25,7 @@ from blockvis.pictures.marks import evenly
 from blockvis.pictures.render import check_increments, draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
 from blockvis.results.about import about, phases_of
-from blockvis.results.cracks import Crack, cracks_of
+from blockvis.results.cracks import Crack, last_cracks
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text, width_text
@@ -83,7 +83,7 @@ def write_pdf(
             paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay, **eye), state)
             paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), "Curve", 150.0)
             paper.tabulate(*_states(response))
-            cracks = cracks_of(response.assembly, last.pose, last.fallen)
+            cracks = last_cracks(response)
             if cracks:
                 paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png", **eye), "Cracks")
                 paper.tabulate("Cracks at the last equilibrium", *_crack_table(cracks))

@@ -132,6 +132,11 @@ def cracks_of(assembly: solver.Assembly, pose: solver.Pose, fallen: np.ndarray |
     return sorted((crack for crack in found if crack.width > least), key=lambda crack: -crack.width)
 
 
+def last_cracks(response: solver.Response) -> list[Crack]:
+    """Trace the cracks of the last equilibrium of a response, the widest first; none where there is none."""
+    return [crack for end in response.path[-1:] for crack in cracks_of(response.assembly, end.pose, end.fallen)]
+
+
 def slid_joints(assembly: solver.Assembly, moved: np.ndarray) -> np.ndarray:
     """(n,) int array: joints that by their opening and slip (n_joints, 2) [m] have slid by far and are not open.
 
