@@ -124,17 +124,12 @@ class CurvePanel:
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
         # In points: letters at ticks, a tenth smaller, are then as high as the smallest of the sheet.
-        _Plot(axes, response, words=False, text=0.72 * text).draw()
+        plot = _Plot(axes, response, words=False, text=0.72 * text)
+        plot.draw()
         canvas.draw()
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
-        per_length, _ = parameter_unit(response)
-        total = response.parameters
-        factor, _ = force_unit(response)
-        values = response.values / factor
-        places = (
-            axes.transData.transform(np.column_stack([total * per_length, values])) if len(total) else np.zeros((0, 2))
-        )
-        self._total = total
+        places = axes.transData.transform(np.column_stack([plot.total, plot.values]))
+        self._total = total = response.parameters
         self._places = np.column_stack([places[:, 0], size[1] - places[:, 1]])
         self._offsets = {i.phase: float(t - i.parameter) for t, i in zip(total[::-1], response.path[::-1], strict=True)}
 
@@ -142,7 +137,7 @@ class CurvePanel:
         """Return the curve with the dot at an increment; at the end of the curve during the fall."""
         picture = self._picture.copy()
         # Phases in another unit are not on the curve.
-        if len(self._total) == 0 or increment.phase not in self._offsets:
+        if increment.phase not in self._offsets:
             return picture
         falling = increment.status == solver.Status.FALLING
         at = self._offsets[increment.phase] + increment.parameter
