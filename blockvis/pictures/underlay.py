@@ -82,9 +82,7 @@ class CarriedPhotograph:
         if (high <= low).any():
             return
         width, height = (high - low).tolist()
-        angle = float(np.ravel(pose.rotations[block])[0])
-        c, s = np.cos(angle), np.sin(angle)
-        back = np.linalg.inv(self._turn) @ np.array([[c, s], [-s, c]])
+        back = np.linalg.inv(self._turn) @ mechanics.rotation_matrices(pose.rotations[[block]])[0].T
         start = self._assembly.centroids[block] - self._corner
         shift = self._turn @ low + self._corner - pose.positions[block]
         place = np.column_stack([back @ self._turn, back @ shift + np.linalg.inv(self._turn) @ start])
