@@ -66,15 +66,6 @@ PROCESS_SECONDS = 2.0
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
 
-#: Options of ``convert`` that say how a layout file is read, with their defaults: results are no layout file.
-_OF_LAYOUTS: dict[str, tuple[Any, ...]] = {
-    **dict.fromkeys(("unit", "view", "window", "width", "height", "pixel", "background", "smallest"), (None,)),
-    "dimension": ("auto",),
-    "ignore": ([],),
-    "only": ([],),
-    "joint_thickness": ("0",),
-}
-
 #: What ``blockvis completion`` writes for, and where it goes.
 SHELLS = {
     "bash": "blockvis completion bash > ~/.local/share/bash-completion/completions/blockvis",
@@ -970,8 +961,9 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     from .results.fall_files import known_fall
     from .runs.reopen import open_results
 
+    bare = vars(_options(["convert", options.source, options.target]))
+    given = [name for name, default in bare.items() if name != "force" and getattr(options, name) != default]
     suffix = target.suffix.lower()
-    given = [name for name, value in vars(options).items() if name in _OF_LAYOUTS and value not in _OF_LAYOUTS[name]]
     # As files of bodies want them, blocks of the plane may be put into space.
     into_space = options.dimension == "3" and suffix not in (".vtkhdf", ".glb")
     if given != ["dimension"] * into_space:

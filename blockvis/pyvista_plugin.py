@@ -279,9 +279,7 @@ class BlockvisAccessor:
         """
         assembly = self.assembly(roles, dimension=dimension)
         blocks = pv.UnstructuredGrid(block_grid(assembly))
-        colours = palette.block_colours(assembly.materials, assembly.free)
-        colours[assembly.moving] = palette.MOVING
-        blocks.cell_data["colour"] = colours
+        blocks.cell_data["colour"] = palette.role_colours(assembly)
         plotter = pv.Plotter(off_screen=off_screen, window_size=list(window_size))
         plotter.background_color = "white"
         if assembly.dimension == 2:

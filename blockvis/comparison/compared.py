@@ -33,9 +33,6 @@ MOST_CRACKS = 10
 #: How many settlements have pictures side by side: the last that both reach, and even parts of it.
 STATIONS = 3
 
-#: Openings below this are none [m].
-CLOSED = 1e-6
-
 
 @dataclass(frozen=True)
 class Side:
@@ -247,7 +244,8 @@ def _cracks_at(side: Side, at: float) -> tuple[list[Crack], dict[frozenset[str],
     state, assembly = side.state(at), side.response.assembly
     joints = initial_joints(assembly)
     opening = opening_and_slip(assembly, joints, state.pose)[:, 0]
-    opening[opening < CLOSED] = 0.0
+    # Below a micrometre none is open.
+    opening[opening < 1e-6] = 0.0
     opening[state.fallen[joints.block_a] | state.fallen[joints.block_b]] = np.nan
     found: dict[frozenset[str], float] = {}
     for a, b, width in zip(joints.block_a.tolist(), joints.block_b.tolist(), opening.tolist(), strict=True):

@@ -25,25 +25,16 @@ from blockvis.pictures.captions import (
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.figures import plain_plot, plain_text, saved
-from blockvis.pictures.film import END, PAUSE
+from blockvis.pictures.film import END, PATH_SECONDS, PAUSE
 from blockvis.pictures.frame import fitting_font, framed
+from blockvis.pictures.render import save_picture
 from blockvis.pictures.swing import shown_increments
 from blockvis.pictures.video import write_film
-from blockvis.system.atomic_files import atomic_file
 
 from .compared import Comparison, Side
 
 #: Colours and lines of the two curves, told apart without colour, too.
 COLOURS, LINES = (palette.FORCE, palette.OPEN), ("-", "--")
-
-#: Usual width and height of the picture of one run [pixels], beside that of the other or, of wide structures, below it.
-TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
-
-#: Structures wider than this for their height stand below each other.
-WIDE = 2.5
-
-#: Seconds for the path to the last equilibrium of both.
-SECONDS = 6.0
 
 #: Height of the strip with the name of the run [pixels].
 STRIP = 40
@@ -90,8 +81,9 @@ class Pair:
 
     def __init__(self, comparison: Comparison, look: Look, stations: np.ndarray | None = None) -> None:
         self.sides, self._longest = comparison.sides, comparison.longest
-        self._below = all(_aspect(side) > WIDE for side in self.sides)
-        usual, across = (WIDE_PANEL, 1) if self._below else (TALL_PANEL, 2)
+        # Wide structures stand below each other.
+        self._below = all(_aspect(side) > 2.5 for side in self.sides)
+        usual, across = ((1280, 480), 1) if self._below else ((800, 620), 2)
         in_space = all(side.response.assembly.dimension == 3 for side in self.sides)
         self.drawers: list[Drawer] = []
         for side in self.sides:
@@ -133,21 +125,19 @@ class Pair:
         title = state_text(state, self.sides[k].response, self._longest)
         return self.drawers[k].picture(state, title=title, widths=widths)
 
-    def at(self, parameter: float, *, widths: bool = False) -> Image.Image:
-        """Draw both at a parameter over all phases [m or rad], and write the widths of the main cracks if asked to."""
-        return self.picture([self.path_picture(k, parameter, widths=widths) for k in (0, 1)])
+    def at(self, parameter: float) -> Image.Image:
+        """Draw both at a parameter over all phases [m or rad], with the widths of the main cracks."""
+        return self.picture([self.path_picture(k, parameter, widths=True) for k in (0, 1)])
 
 
 def draw_stations(comparison: Comparison, path: Path) -> Path:
     """Draw both at the same settlements, one row below the other."""
     pair = Pair(comparison, Look(forces="none"), comparison.stations)
-    rows = [pair.at(at, widths=True) for at in comparison.stations.tolist()]
+    rows = [pair.at(at) for at in comparison.stations.tolist()]
     page = Image.new("RGB", (pair.size[0], sum(row.height for row in rows)), palette.PAPER)
     for k, row in enumerate(rows):
         page.paste(row, (0, k * row.height))
-    with atomic_file(path) as partial:
-        page.save(partial, format="PNG")
-    return path
+    return save_picture(page, path)
 
 
 def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int, int], None] | None = None) -> Path:
@@ -161,18 +151,16 @@ def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int,
     count = max(2, int(np.ceil((longest + PAUSE + END) * RATE)))
 
     def pictures() -> Iterator[Image.Image]:
-        last: list[Image.Image | None] = [None, None]
-        shown: list[object] = [None, None]
+        last: dict[int, tuple[object, Image.Image]] = {}
         for frame in range(count):
-            time = frame / RATE
             for k, side in enumerate(comparison.sides):
-                what, at = moment = _moment(side, time, end)
-                if moment != shown[k] or last[k] is None:
-                    last[k] = pair.drawers[k].falling_picture(at) if what == "fall" else pair.path_picture(k, at)
-                    shown[k] = moment
+                what, at = moment = _moment(side, frame / RATE, end)
+                if k not in last or last[k][0] != moment:
+                    falls = what == "fall"
+                    last[k] = moment, pair.drawers[k].falling_picture(at) if falls else pair.path_picture(k, at)
             if progress is not None:
                 progress(frame + 1, count)
-            yield pair.picture([image for image in last if image is not None])
+            yield pair.picture([image for _, image in last.values()])
 
     return write_film(pictures(), path, size=pair.size, fps=RATE)
 
@@ -184,19 +172,19 @@ def _aspect(side: Side) -> float:
 
 def _arrival(side: Side, end: float) -> float:
     """Seconds after which a run is at its last equilibrium."""
-    return SECONDS * side.end / end if end > 0.0 else 0.0
+    return PATH_SECONDS * side.end / end if end > 0.0 else 0.0
 
 
 def _seconds(side: Side, end: float) -> float:
     falls = 0.0 if side.fall is None else PAUSE + float(side.fall.times[-1])
-    return max(_arrival(side, end) + falls, SECONDS)
+    return max(_arrival(side, end) + falls, PATH_SECONDS)
 
 
 def _moment(side: Side, time: float, end: float) -> tuple[str, float]:
     """Give what a run shows at a time of the film: a place on its path, or a moment of its fall."""
     arrival = _arrival(side, end)
     if time < arrival:
-        return "path", end * time / SECONDS
+        return "path", end * time / PATH_SECONDS
     if side.fall is None or time < arrival + PAUSE:
         return "path", side.end
     return "fall", min(time - arrival - PAUSE, float(side.fall.times[-1]))

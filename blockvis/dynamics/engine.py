@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 import solver
 from solver import mechanics
 
-from .spin import axes_at, free_spin, principal_inertia
+from .spin import free_spin, principal_inertia
 
 #: Longest and shortest step, in √(block size / g), and how far a corner moves in a step at most, in block sizes.
 LONGEST_STEP, SHORTEST_STEP, STRIDE = 0.17, 1e-3, 0.3
@@ -151,8 +151,7 @@ class Engine:
         """(n_blocks,) array [J]: potential and kinetic energy of the free blocks, and of what holds on to them."""
         height = (self.loads[:, : self.d] * self.pose.positions).sum(axis=1) / self.length
         height += np.trace(mechanics.rotation_matrices(self.pose.rotations) @ self.arms, axis1=1, axis2=2)
-        kinetic = self._kinetic(self.velocity, axes_at(self.pose, self.drawn_axes))
-        energies = kinetic - height
+        energies = self._kinetic - height
         if self.ties:
             members = self._members(self.pose)
             stored = 0.5 * np.minimum(members.gaps / self.length, 0.0) ** 2 / self.give[members.features[:, 1]]
@@ -176,7 +175,7 @@ class Engine:
         flight, velocity = self._flight(h)
         contacts = self._near(h)
         before, trial = self._transferred(contacts)
-        axes = axes_at(self.pose, self.drawn_axes)
+        axes = self._axes
         motion = flight
         for left in range(LINEARISATIONS, 0, -1):
             pose = mechanics.moved(self.pose, motion * self.scales)
@@ -239,7 +238,7 @@ class Engine:
         motion, velocity = h * self.velocity, self.velocity.copy()
         spinning = np.flatnonzero((self.velocity[:, self.d :] != 0.0).any(axis=1))
         if self.d == 3 and len(spinning):
-            axes = axes_at(self.pose, self.drawn_axes)[spinning]
+            axes = self._axes[spinning]
             spin = np.einsum("nji,nj->ni", axes, self.velocity[spinning, 3:])
             turn, after = free_spin(self.weights[spinning, 3:], spin, h)
             motion[spinning, 3:] = np.einsum("nij,nj->ni", axes, turn)
@@ -347,8 +346,16 @@ class Engine:
             return motion
         return np.concatenate([motion[:, :3], np.einsum("nij,nj->ni", axes, motion[:, 3:])], axis=1)
 
-    def _kinetic(self, velocity: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        turned = self._along(velocity, axes.transpose(0, 2, 1))
+    @property
+    def _axes(self) -> np.ndarray:
+        """(n_blocks, d, d) array: principal axes of the blocks, as columns."""
+        turned = [mechanics.turned(self.drawn_axes[:, :, k], self.pose.rotations) for k in range(self.d)]
+        return np.stack(turned, axis=2)
+
+    @property
+    def _kinetic(self) -> np.ndarray:
+        """(n_blocks,) array: kinetic energy, in the units of the engine."""
+        turned = self._along(self.velocity, self._axes.transpose(0, 2, 1))
         return np.asarray(0.5 * (self.weights * turned**2).sum(axis=1))
 
     def _lose(self, before: np.ndarray) -> None:
@@ -360,6 +367,6 @@ class Engine:
         links = sp.coo_array((np.ones(int(both.sum())), (a[both], b[both])), shape=(n, n))
         count, group = connected_components(links, directed=False)
         grown = np.bincount(group, (self.energies - before), count) / (self.mass * solver.GRAVITY * self.length)
-        kinetic = np.bincount(group, self._kinetic(self.velocity, axes_at(self.pose, self.drawn_axes)), count)
+        kinetic = np.bincount(group, self._kinetic, count)
         part = np.clip(1.0 - np.maximum(grown, 0.0) / np.maximum(kinetic, 1e-300), 0.0, 1.0)
         self.velocity = self.velocity * np.sqrt(part)[group][:, None]

@@ -83,11 +83,8 @@ class Fall:
         if not self.tie_rest.size:
             return mechanics.TieForces()
         k = self._before(time)
-        forces, rest, ends = (
-            self.tie_forces[k],
-            self.tie_rest[k],
-            mechanics.tie_ends(ties, response.assembly, self.at(time)),
-        )
+        forces, rest = self.tie_forces[k], self.tie_rest[k]
+        ends = mechanics.tie_ends(ties, response.assembly, self.at(time))
         strength = np.array([tie.strength for tie in ties])
         states = mechanics.member_states(np.abs(forces), strength, response.total_weight)
         states = np.where(np.isnan(rest), mechanics.BROKEN, states)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 import solver
-from solver import mechanics
 
 
 def principal_inertia(assembly: solver.Assembly) -> tuple[np.ndarray, np.ndarray]:
@@ -41,8 +40,3 @@ def free_spin(inertia: np.ndarray, spin: np.ndarray, time: float) -> tuple[np.nd
 def _cross(vectors: np.ndarray) -> np.ndarray:
     """(n, 3, 3) array: matrices that make cross products with vectors."""
     return np.cross(vectors[:, None], np.eye(3)).transpose(0, 2, 1)
-
-
-def axes_at(pose: solver.Pose, axes: np.ndarray) -> np.ndarray:
-    """(n_blocks, d, d) array: axes of the blocks, as columns, at a pose."""
-    return np.stack([mechanics.turned(axes[:, :, k], pose.rotations) for k in range(axes.shape[2])], axis=2)

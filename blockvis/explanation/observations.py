@@ -39,10 +39,6 @@ POINT_UNCERTAINTY = 1e-3
 #: so is an uncertainty of more than this, in largest widths or displacements.
 FARTHEST = 2.0
 
-#: A width of more than this, in block sizes, is a mistake in its unit; blocks of a drawing that are paired by their
-#: shapes have moved by less, or are others.
-WIDEST = 1.0
-
 #: A point that is displaced by more than this fraction of the structure is a mistake in its unit.
 FARTHEST_POINT = 0.3
 
@@ -228,7 +224,7 @@ def _of_rows(
             place, joint, whole, label = _place(cells, assembly, joints)
             # Joints may meet at a place.
             _refuse_again(first, (joint, *place.tolist()), cells, "width", label, "width for each place")
-            if width > WIDEST * assembly.block_size:
+            if width > assembly.block_size:
                 raise cells.error(
                     "width",
                     f"is {width:g} m, more than a block is wide ({assembly.block_size:.3g} m); is it in mm? name the "
@@ -553,7 +549,8 @@ def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: so
     # Two blocks of unlike size are not the same stone, however near they lie.
     cost = apart + np.abs(np.log(assembly.areas[:, None] / areas[None]))
     rows, columns = linear_sum_assignment(cost)
-    return {int(i): int(k) for i, k in zip(rows, columns, strict=True) if cost[i, k] < WIDEST}
+    # What has moved by more than a block is another one.
+    return {int(i): int(k) for i, k in zip(rows, columns, strict=True) if cost[i, k] < 1.0}
 
 
 def _moved(assembly: solver.Assembly, block: int, ring: np.ndarray) -> tuple[np.ndarray, float]:

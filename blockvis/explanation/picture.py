@@ -25,7 +25,7 @@ from blockvis.pictures.drawer import WHOLE, magnified
 from blockvis.pictures.figures import plain_text, saved
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.sight_lines import SightLines
-from blockvis.pictures.solid_view import ABOVE, ALIKE, IN_FRONT, View, hiding_supports, views_from
+from blockvis.pictures.solid_view import ABOVE, IN_FRONT, View, first_alike, hiding_supports, views_from
 from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joint_faces import Rings
 from blockvis.results.joints import carried_faces
@@ -39,11 +39,8 @@ if TYPE_CHECKING:
     from .ranking import Cause
     from .result import Explanation
 
-#: The largest displacement is drawn as this fraction of the structure.
-SHOWN = 0.07
-
-#: Height of text [points], width of a panel and height of the words above it [inch].
-TEXT, PANEL, HEAD = 12.0, 5.4, 0.7
+#: Height of text [points] and width of a panel [inch].
+TEXT, PANEL = 12.0, 5.4
 
 #: Colours as matplotlib takes them.
 INK, FAINT, OPEN, OUTLINE, FORCE, WARNING, SETTLEMENT = (
@@ -55,7 +52,8 @@ INK, FAINT, OPEN, OUTLINE, FORCE, WARNING, SETTLEMENT = (
 WIDE = 4.0
 
 #: Pixels of matplotlib per inch, and of the blocks in space.
-DPI, FINE = 130, 260
+DPI = 130
+FINE = 2 * DPI
 
 #: What it costs to look from below, beside having the cracks, and what has moved far, in front by the size of the
 #: structure, and seeing all of them.
@@ -109,14 +107,15 @@ def _magnification(assembly: solver.Assembly, pose: solver.Pose) -> float:
     """Find a round factor with which the largest displacement is seen."""
     most = float(np.linalg.norm(pose.positions - assembly.centroids, axis=1).max())
     extent = float(np.ptp(assembly.vertices[assembly.free[assembly.block_of_vertex]], axis=0).max())
-    return max(1.0, rounded_length(SHOWN * extent / most)) if most > 0.0 else 1.0
+    return max(1.0, rounded_length(0.07 * extent / most)) if most > 0.0 else 1.0
 
 
 def _panels(count: int, aspect: float) -> tuple[Figure, np.ndarray]:
     """Make a figure with panels beside each other, or below each other where what they show is wide for its height."""
     rows, columns = (count, 1) if aspect > WIDE else (1, count)
     width = PANEL * (2.0 if aspect > WIDE else 1.0)
-    height = min(width / aspect, 1.4 * PANEL) + HEAD
+    # With room for the words above.
+    height = min(width / aspect, 1.4 * PANEL) + 0.7
     figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06))
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
@@ -154,8 +153,7 @@ def _view_of(found: Explanation) -> View:
         worths = np.minimum(2.0 * shares, 1.0) + front
         return float(sizes @ worths) / float(sizes.sum()) - (FROM_BELOW if view.above < 0.0 else 0.0)
 
-    values = [worth(view) for view in views]
-    return next(view for view, value in zip(views, values, strict=True) if value >= max(values) - ALIKE)
+    return first_alike(views, worth)
 
 
 def _pieces(rings: Rings) -> np.ndarray:

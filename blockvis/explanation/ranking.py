@@ -17,9 +17,6 @@ TOLD_APART = 10.0
 #: Shares of the probability below and above the range of an amount.
 TAILS = (0.05, 0.5, 0.95)
 
-#: A joint tells causes apart where their widths differ by so many standard deviations.
-DECISIVE = 1.0
-
 #: Causes less probable than this are not worth a measurement, but for the second.
 WORTH_A_WORD = 0.01
 
@@ -130,10 +127,7 @@ def _range_of(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float, fl
     likely = [(s, trial) for s, trial in zip(share, own, strict=True) if s > 0.0]
     amounts = np.concatenate([trial.amounts for _, trial in likely])
     mass = np.concatenate([s * np.exp(trial.log_mass - logsumexp(trial.log_mass)) for s, trial in likely])
-    order = np.argsort(amounts)
-    below = np.cumsum(mass[order])
-    places = np.searchsorted(below, np.array(TAILS) * below[-1])
-    low, middle, high = amounts[order][places].tolist()
+    low, middle, high = np.quantile(amounts, TAILS, weights=mass, method="inverted_cdf").tolist()
     return low, middle, high
 
 
@@ -194,7 +188,8 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
     apart = (np.abs(mean[:, None] - mean) / np.hypot(sigma[:, None], sigma)).max(axis=(0, 1))
     # Where somebody has measured already nothing new is to be found.
     apart[comparison.own] = 0.0
-    gain = np.where(apart < DECISIVE, 0.0, _information(mean, sigma, weights / weights.sum()))
+    # A difference within a standard deviation tells nothing.
+    gain = np.where(apart < 1.0, 0.0, _information(mean, sigma, weights / weights.sum()))
     if not gain.max(initial=0.0) > 0.0:
         return None
     # Where several joints tell all there is to tell, rounding would choose.

@@ -18,22 +18,14 @@ from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
 
 from . import palette
+from .film import PATH_SECONDS, PAUSE
 from .swing import shown_increments
 
-#: Seconds in which the path passes, that the last equilibrium and the end stand, and of a frame of pseudo-time.
-PATH, STANDS, FRAME = 6.0, 0.5, 0.1
-
-#: Seconds between two states at one parameter.
-AT_ONCE = 1e-3
-
-#: Radius of ties, in block sizes.
-TIE_RADIUS = 0.03
+#: Seconds of a frame of pseudo-time.
+FRAME = 0.1
 
 #: Rotation that turns z upwards into y upwards, as glTF has it.
 UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
-
-#: Component type of single precision in glTF.
-FLOAT = 5126
 
 
 def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None = None) -> Path:
@@ -60,8 +52,9 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
         def added(values: np.ndarray, kind: str) -> int:
             data, number = np.ascontiguousarray(values, dtype="<f4"), len(tree["accessors"])
             least, most = (np.atleast_1d(of).astype(float).tolist() for of in (data.min(axis=0), data.max(axis=0)))
+            # Components of type 5126 have single precision.
             tree["accessors"][f"motion {number}"] = {
-                "bufferView": len(buffer), "componentType": FLOAT, "count": len(data), "type": kind,
+                "bufferView": len(buffer), "componentType": 5126, "count": len(data), "type": kind,
                 "min": least, "max": most,
             }  # fmt: skip
             buffer[f"motion {number}"] = data.tobytes()
@@ -102,10 +95,10 @@ def _played(
     # Positions of a load may be negative, times may not.
     path, along = response.path, response.parameters - response.parameters[:1]
     reach = float(along[-1]) if path else 0.0
-    times = PATH * along / reach if reach > 0.0 else 0.1 * np.arange(len(path))
+    times = PATH_SECONDS * along / reach if reach > 0.0 else FRAME * np.arange(len(path))
     moments = [(float(time), one.pose, one.ties) for time, one in zip(times, path, strict=True)]
     moments = moments or [(0.0, solver.Pose.initial(response.assembly), mechanics.TieForces())]
-    start, last = moments[-1][0] + STANDS, moments[-1][1:]
+    start, last = moments[-1][0] + PAUSE, moments[-1][1:]
     if fall is not None:
         moments += [
             (start + time, fall.pose(k), fall.ties_at(time, response)) for k, time in enumerate(fall.times.tolist())
@@ -113,10 +106,10 @@ def _played(
     elif frames := [i for i in shown_increments(response) if i.status == solver.Status.FALLING]:
         moments.append((start, *last))
         moments += [(start + FRAME * k, frame.pose, frame.ties) for k, frame in enumerate(frames, start=1)]
-    moments.append((moments[-1][0] + STANDS, *moments[-1][1:]))
+    moments.append((moments[-1][0] + PAUSE, *moments[-1][1:]))
     clock = np.array([time for time, _, _ in moments])
     # What changes between two settlements does so at one parameter; players want times that grow.
-    clock += AT_ONCE * np.cumsum(np.diff(clock, prepend=-1.0) <= 1e-6)
+    clock += 1e-3 * np.cumsum(np.diff(clock, prepend=-1.0) <= 1e-6)
     stands = [~one.fallen for one in path] or [np.ones(response.assembly.n_blocks, dtype=bool)]
     stands += stands[-1:] * (len(moments) - len(stands))
     return clock, [pose for _, pose, _ in moments], [ties for *_, ties in moments], np.array(stands)
@@ -163,7 +156,7 @@ def _rods(
     for k, found in enumerate(tied):
         if len(found.states) == len(ties):
             there[k, :, 0] = ~np.isin(found.states, (mechanics.ABSENT, mechanics.BROKEN))
-    radius = np.full((*length.shape[:2], 2), TIE_RADIUS * assembly.block_size)
+    radius = np.full((*length.shape[:2], 2), 0.03 * assembly.block_size)
     return ends.mean(axis=2), turns, there * np.concatenate([radius, length], axis=2)
 
 

@@ -11,9 +11,6 @@ import solver
 
 from .hatching import hatched
 
-#: Distance of hatch lines, in extents of the fill.
-SPACING = 0.02
-
 #: Width of a joint that parts no body, in space and in the plane, in extents of the fill.
 GAPING, GAPING_IN_PLANE = 0.02, 0.05
 
@@ -54,7 +51,7 @@ class FillBodies:
     def hatch(self) -> np.ndarray:
         """(m, 2, 2) array [m]: in the plane, lines that fall to the right across the fill."""
         whole = shapely.union_all(shapely.polygons(self.columns), grid_size=SAME_BODY * self._extent)
-        return hatched(whole, SPACING * self._extent, -1.0)
+        return hatched(whole, 0.02 * self._extent, -1.0)
 
     def rims(self) -> np.ndarray:
         """(m, 2, d) array [m]: edges of the bodies, in the surface and in space up to it from the extrados."""

@@ -9,7 +9,7 @@ import numpy as np
 import solver
 from blockvis.dynamics.fall import CAPTION
 from blockvis.results.about import after_settlements, collapse_phase, least_reaction, loss_of, phases_of, told_reaction
-from blockvis.text import force_text, padded_text
+from blockvis.text import PREFIXES, force_text, padded_text
 from solver import mechanics
 
 #: Warning on frames of a fall in real time.
@@ -144,10 +144,8 @@ def force_unit(response: solver.Response) -> tuple[float, str]:
 
 def unit_for(largest: float, unit: str = "N") -> tuple[float, str]:
     """Divisor and unit in which values up to a largest one [N or N·m] read well."""
-    for factor, prefix in ((1e6, "M"), (1e3, "k")):
-        if largest >= factor:
-            return factor, prefix + unit
-    return 1.0, unit
+    # Axes end with mega.
+    return next((factor, prefix + unit) for factor, prefix in PREFIXES[1:] if largest >= factor or factor == 1.0)
 
 
 def value_label(response: solver.Response) -> str:

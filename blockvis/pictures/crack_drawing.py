@@ -71,12 +71,10 @@ def draw_cracks(
 
         thickness = "the widest "
         drawing = CracksInSpace(response, increment, joints, size, cracks, *seen_from(view, section))
-        sheet = drawing.sheet
-        shown = drawing.left_by_section(cracks)
-        main = main_cracks(shown)
-        picture = drawing.image(main, _numbers(main, cracks))
+        # What it hides is known when it is drawn.
+        picture = drawing.image()
+        sheet, shown, hidden = drawing.sheet, drawing.shown, drawing.hidden
         keys, pixel, slip, drawn, cut_at = drawing.keys, drawing.pixel, drawing.slip, "", drawing.section
-        hidden = len(drawing.hidden(shown))
     lost = loss_words(increment)
     none = f"no joint {'of what stands ' * bool(lost)}is open" + (
         "" if response.parameter.is_path else ": a limit load is of the layout as it stands"
@@ -111,16 +109,16 @@ def _drawn_in_plane(
     assembly, main, start = response.assembly, main_cracks(cracks), solver.Pose.initial(response.assembly)
     openings = np.maximum(carried_faces(assembly, joints, increment.pose).gaps.reshape(-1, 2), 0.0)
     widest = cracks[0].width if cracks else 1.0
-    fill = palette.block_colours(assembly.materials, assembly.free)
-    fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
+    fill = palette.pale(palette.block_colours(assembly.materials, assembly.free), True, palette.SURVEY)
     frame = framed(assembly, [start])
     sheet = Sheet(size or sheet_size(frame))
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
-    if increment.fallen.any():
-        scene.hide(increment.fallen)
-        scene.pose(start)
-    others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
-    layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.GHOST) for crack in others)]
+    scene.hide(increment.fallen)
+    scene.pose(start)
+    # The numbers are those of the report.
+    named = [(1 + cracks.index(crack), crack, shade) for crack, shade in zip(main, palette.SURVEYED, strict=False)]
+    others = [(crack, palette.GHOST) for crack in cracks if crack not in main]
+    layers = [*((crack, shade) for _, crack, shade in named), *others]
     height = scene.usual_height * scene.pixel
     thin, thick = THIN * height, max(min(THICK * height, OF_BLOCK * assembly.block_size), 2.0 * THIN * height)
     # The main ones are drawn last, on top.
@@ -136,20 +134,11 @@ def _drawn_in_plane(
         dots = along_lines(np.concatenate([joints.ends[crack.joints] for crack in cracks]))
         arrows = np.stack([scene.at_pixel(tails), scene.at_pixel(tips)], axis=1)
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
-        words = [f"{n}: {width_text(crack.width)}" for n, crack in zip(_numbers(main, cracks), main, strict=True)]
-        colours = palette.SURVEYED[: len(main)]
-        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours, arrows)
-    named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
-    keys = [Key("line", f"crack {number}", colour) for number, colour in named]
-    if others:
-        keys.append(Key("line", mechanics.counted(len(others), "other"), palette.GHOST))
+        words = [f"{n}: {width_text(crack.width)}" for n, crack, _ in named]
+        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), palette.SURVEYED[: len(main)], arrows)
+    keys = [Key("line", f"crack {n}", shade) for n, _, shade in named]
+    keys += [Key("line", mechanics.counted(len(others), "other"), palette.GHOST)] * bool(others)
     return sheet, picture, keys, scene.pixel
-
-
-def _numbers(main: list[Crack], cracks: list[Crack]) -> list[int]:
-    """Count the main cracks as the report does."""
-    number_of = {id(crack): k for k, crack in enumerate(cracks, start=1)}
-    return [number_of[id(crack)] for crack in main]
 
 
 def _bars(ends: np.ndarray, half: np.ndarray) -> np.ndarray:

@@ -24,9 +24,8 @@ from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, s
 from .surface import IN_PLANE
 from .swing import swing_of
 
-#: Widths between the classes are of these, times a power of ten [mm]; most classes; thinnest and thickest line in
-#: heights of the picture.
-STEPS, MOST_CLASSES, THIN, THICK = (1.0, 2.0, 5.0), 4, 1.0 / 360.0, 1.0 / 100.0
+#: Thinnest and thickest line, in heights of the picture.
+THIN, THICK = 1.0 / 360.0, 1.0 / 100.0
 
 #: An edge is drawn in so many pieces: its opening changes from end to end.
 PIECES = 6
@@ -66,9 +65,11 @@ class CracksInSpace:
         self._slid = edges.chosen(slides).over(plane, near)
         self._slips = np.abs(moved[self._slid.joints, 1])
         self.slip = float(self._slips.max(initial=0.0))
-        self._seen_joints = np.zeros(0, dtype=int)
-        limits = class_limits(float(self._opened.openings.max(initial=0.0)))
-        colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
+        #: The cracks of which the section leaves something, and how many of them no view of the last image shows.
+        self.shown = [crack for crack in cracks if np.isin(crack.joints, self._opened.joints).any()]
+        self.hidden = 0
+        # The numbers are those of the report.
+        self._main = [(1 + cracks.index(crack), crack) for crack in main_cracks(self.shown)]
         self._tells_moving = bool(response.settlements)
         roles = palette.role_colours(assembly, self._tells_moving)
         initial = solver.Pose.initial(assembly)
@@ -79,74 +80,65 @@ class CracksInSpace:
             assembly, self._views, frame, self.sheet, roles, fine=True, cut=plane, outline=palette.PALE_OUTLINE
         )
         self._pair.hide(increment.fallen)
-        every = np.ones(assembly.n_blocks, dtype=bool)
-        self._pair.pose(initial, palette.pale(roles, every, palette.SURVEY))
-        self._draw(limits, colours)
-        self.pixel = self._pair.pixel
+        self._pair.pose(initial, palette.pale(roles, True, palette.SURVEY))
+        self.pixel, self.keys = self._pair.pixel, self._drawn()
+
+    def _drawn(self) -> list[Key]:
+        """Draw lines where joints have opened, in their classes, and where they slide; returns the legend."""
+        limits = class_limits(float(self._opened.openings.max(initial=0.0)))
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]
-        self.keys = [Key("line", text, colour) for text, colour in zip(words, colours, strict=True)]
-        if not len(self._opened.joints):
-            self.keys = []
-        if len(self._slid.joints):
-            self.keys.append(Key("line", "sliding joint", palette.SLIDING))
-
-    def left_by_section(self, cracks: Sequence[Crack]) -> list[Crack]:
-        """Choose the cracks of which the section leaves something."""
-        return [crack for crack in cracks if np.isin(crack.joints, self._opened.joints).any()]
-
-    def hidden(self, cracks: Sequence[Crack]) -> list[Crack]:
-        """Choose the cracks of which the views of the last image show nothing."""
-        return [crack for crack in cracks if not np.isin(crack.joints, self._seen_joints).any()]
-
-    def _draw(self, limits: Sequence[float], colours: Sequence[tuple[int, int, int]]) -> None:
         height, which = self._pair.usual_height, np.searchsorted(limits, self._opened.openings)
-        for k, colour in enumerate(colours):
-            thick = height * (THIN + k / max(len(colours) - 1, 1) * (THICK - THIN))
-            self._pair.lines(f"crack/{k}", self._opened.ends[which == k], colour, thick, 2.0 + k)
+        keys = [
+            Key("line", text, palette.rgb(colour))
+            for text, colour in zip(words, palette.crack_colours(len(words)), strict=True)
+        ]
+        for k, key in enumerate(keys):
+            thick = height * (THIN + k / max(len(keys) - 1, 1) * (THICK - THIN))
+            self._pair.lines(f"crack/{k}", self._opened.ends[which == k], key.colour, thick, 2.0 + k)
         self._pair.lines("sliding", self._slid.ends, palette.SLIDING, height * (THIN + THICK) / 2.0, 1.5)
+        sliding = [Key("line", "sliding joint", palette.SLIDING)] * bool(len(self._slid.joints))
+        return keys * bool(len(self._opened.joints)) + sliding
 
-    def image(self, cracks: Sequence[Crack], numbers: Sequence[int]) -> Image.Image:
-        """Draw the views, with number and largest width of each crack in the view that shows its widest place.
+    def image(self) -> Image.Image:
+        """Draw the views, with number and largest width of each main crack in the view that shows its widest place.
 
-        The numbers are those of the report. Of a crack whose widest place is hidden that is the widest one that some
-        view shows.
+        Of a crack whose widest place is hidden that is the widest one that some view shows.
         """
-        page, left = self._pair.image(), 0
-        opened, slid = self._opened, self._slid
-        found: dict[int, tuple[float, np.ndarray]] = {}
-        slipped: tuple[float, np.ndarray] = 0.0, np.zeros(2)
-        dots, seen_joints = [], []
-        for scene in self._pair.scenes:
-            offset, thin = np.array([left, 0]), THIN * scene.usual_height
-            seen, pixels = ~scene.hides(opened.middles, thin), scene.at_pixel(opened.middles) + offset
-            for crack, number in zip(cracks, numbers, strict=True):
-                here = seen & np.isin(opened.joints, crack.joints)
-                widest = int(np.where(here, opened.openings, -1.0).argmax()) if len(here) else 0
-                if here.any() and (number not in found or opened.openings[widest] > found[number][0]):
-                    found[number] = opened.openings[widest], pixels[widest]
-            slides, along = ~scene.hides(slid.middles, thin), scene.at_pixel(slid.middles) + offset
-            slips = np.where(slides, self._slips, 0.0)
-            if slips.max(initial=0.0) > slipped[0]:
-                slipped = float(slips.max()), along[slips.argmax()]
-            dots += [pixels[seen], along[slides]]
-            seen_joints.append(opened.joints[seen])
-            left += scene.size[0]
+        page, opened, labels, places = self._pair.image(), self._opened, list[str](), list[np.ndarray]()
+        seen, pixels = self._in_views(opened.middles)
+        slides, along = self._in_views(self._slid.middles)
+        joints, openings, slips = (
+            np.tile(of, len(self._views)) for of in (opened.joints, opened.openings, self._slips)
+        )
+        self.hidden = sum(not np.isin(crack.joints, joints[seen]).any() for crack in self.shown)
+        for number, crack in self._main:
+            own = np.where(seen & np.isin(joints, crack.joints), openings, 0.0)
+            if own.any():
+                labels.append(f"{number}: {width_text(crack.width)}")
+                places.append(pixels[own.argmax()])
+        colours = [palette.OPEN] * len(labels)
+        slips = np.where(slides, slips, 0.0)
+        if slips.any():
+            labels.append(f"slip {width_text(float(slips.max()))}")
+            places.append(along[slips.argmax()])
+            colours.append(palette.SLIDING)
         if self._tells_moving and self._pair.holds("moving"):
-            pale = palette.pale(np.array([palette.MOVING]), np.array([True]), palette.SURVEY)
+            pale = palette.pale(np.array([palette.MOVING]), True, palette.SURVEY)
             self.keys.append(Key("area", "moving support", palette.rgb(pale[0])))
         self._pair.close()
-        self._seen_joints = np.concatenate(seen_joints)
-        labelled = [(crack, n) for crack, n in zip(cracks, numbers, strict=True) if n in found]
-        labels = [f"{n}: {width_text(crack.width)}" for crack, n in labelled]
-        places, colours = [found[n][1] for _, n in labelled], [palette.OPEN] * len(labelled)
-        if slipped[0] > 0.0:
-            labels.append(f"slip {width_text(slipped[0])}")
-            places.append(slipped[1])
-            colours.append(palette.SLIDING)
-        if labels:
-            write_labels(page, np.array(places), labels, self.sheet.text, np.concatenate(dots), colours)
+        dots = np.concatenate([pixels[seen], along[slides]])
+        write_labels(page, np.array(places).reshape(-1, 2), labels, self.sheet.text, dots, colours)
         return page
+
+    def _in_views(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whether the last image shows points (n, 3) [m] of lines, and at which pixels; one view after another."""
+        seen, pixels, left = [], [], 0
+        for scene in self._pair.scenes:
+            seen.append(~scene.hides(points, THIN * scene.usual_height))
+            pixels.append(np.add(scene.at_pixel(points), (left, 0)))
+            left += scene.size[0]
+        return np.concatenate(seen), np.concatenate(pixels)
 
 
 @dataclass(frozen=True)
@@ -225,7 +217,7 @@ def _showing(
 
 
 def class_limits(widest: float) -> list[float]:
-    """List the widths [m] that part the classes of cracks up to a widest [m]: round numbers, the last below it.
+    """List the widths [m] that part the four classes of cracks up to a widest [m]: round numbers, the last below it.
 
     Examples
     --------
@@ -233,5 +225,5 @@ def class_limits(widest: float) -> list[float]:
     [0.02, 0.05, 0.1]
     """
     power = 10.0 ** np.floor(np.log10(widest)) if widest > 0.0 else 1.0
-    every = [step * factor * power for factor in (0.01, 0.1, 1.0) for step in STEPS]
-    return [float(f"{limit:.3g}") for limit in every if limit < 0.999 * widest][-(MOST_CLASSES - 1) :] if widest else []
+    every = [step * factor * power for factor in (0.01, 0.1, 1.0) for step in (1.0, 2.0, 5.0)]
+    return [float(f"{limit:.3g}") for limit in every if limit < 0.999 * widest][-3:] if widest else []

@@ -26,6 +26,7 @@ from blockvis.results.about import (
     phases_of,
 )
 from blockvis.results.reaction_range import ReactionRange
+from blockvis.results.swinging import SWING
 from blockvis.results.tables import change_words
 from blockvis.results.ties import TieForceCurves, tie_force_curves
 from solver import mechanics
@@ -51,27 +52,8 @@ from .figures import plain_plot, plain_text, saved
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
 
-#: Increments have dots where they are no more than this: of more, the dots would be a thick line.
-MOST_DOTS = 25
-
-#: The diagram of one limit load goes so far, as a part of the structure's size: as far as its mechanism is drawn.
-SMALL = 0.05
-
-#: Losses of blocks that have words, the largest.
-MOST_LOSSES = 3
-
-#: Words beside a collapse take so much of the width, and so many heights of the text.
-WORDS, COLLAPSE_LINES = 0.35, 4.2
-
-#: The word in a band that takes less of the width than this stands upright.
-WIDE_BAND = 0.2
-
-#: Height of the text of the file [points], and how many letters a smaller line of it has per inch.
-TEXT, LETTERS = 11.0, 11.0
-
-#: Points of the letters beside the blocks per pixel of the sheet's, at 100 pixels per inch: those at ticks, a tenth
-#: smaller, are then as high as the smallest of the sheet.
-PANEL_TEXT = 0.72
+#: Height of the text of the file [points].
+TEXT = 11.0
 
 #: Colours of what is measured, of what fails, and of what is beside.
 BLUE, RED, GREY = map(palette.hexadecimal, (palette.FORCE, palette.WARNING, palette.FAINT))
@@ -125,7 +107,8 @@ def draw_curve(
         _draw_ties(below, response, ties)
         axes.set_xlabel("")
     name += "" if band is None else f"   ·   band: range of {mechanics.counted(band.runs.max(initial=0), 'run')}"
-    above = _mark_phases(axes, response, int(LETTERS * size[0])) if phases_of(response) else 0.0
+    # Lines of eleven letters an inch.
+    above = _mark_phases(axes, response, int(11.0 * size[0])) if phases_of(response) else 0.0
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK), pad=6.0 + above)
     return saved(figure, path, 200)
 
@@ -140,17 +123,13 @@ class CurvePanel:
         figure = Figure(figsize=(size[0] / 100.0, size[1] / 100.0), dpi=100, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        _Plot(axes, response, words=False, text=text * PANEL_TEXT).draw()
+        # In points: letters at ticks, a tenth smaller, are then as high as the smallest of the sheet.
+        plot = _Plot(axes, response, words=False, text=0.72 * text)
+        plot.draw()
         canvas.draw()
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
-        per_length, _ = parameter_unit(response)
-        total = response.parameters
-        factor, _ = force_unit(response)
-        values = response.values / factor
-        places = (
-            axes.transData.transform(np.column_stack([total * per_length, values])) if len(total) else np.zeros((0, 2))
-        )
-        self._total = total
+        places = axes.transData.transform(np.column_stack([plot.total, plot.values]))
+        self._total = total = response.parameters
         self._places = np.column_stack([places[:, 0], size[1] - places[:, 1]])
         self._offsets = {i.phase: float(t - i.parameter) for t, i in zip(total[::-1], response.path[::-1], strict=True)}
 
@@ -158,7 +137,7 @@ class CurvePanel:
         """Return the curve with the dot at an increment; at the end of the curve during the fall."""
         picture = self._picture.copy()
         # Phases in another unit are not on the curve.
-        if len(self._total) == 0 or increment.phase not in self._offsets:
+        if increment.phase not in self._offsets:
             return picture
         falling = increment.status == solver.Status.FALLING
         at = self._offsets[increment.phase] + increment.parameter
@@ -251,7 +230,8 @@ class _Plot:
         axes.plot(total[: 2 * first], values[: 2 * first], ":", color=BLUE, linewidth=1.2, zorder=3)
         if not self.words:
             return
-        if len(total) <= MOST_DOTS:
+        # Of more the dots would be a thick line.
+        if len(total) <= 25:
             axes.plot(total, values, "o", color=BLUE, markersize=3.0, zorder=3)
         if first:
             # On the side that the curve leaves free.
@@ -263,16 +243,16 @@ class _Plot:
     def _losses(self) -> None:
         """Mark where blocks are lost while the rest stands, and say how many where the curve leaves room."""
         losses = losses_along(self.response)
-        words = sorted(losses, key=lambda loss: -loss[2])[: MOST_LOSSES * self.words]
+        words = sorted(losses, key=lambda loss: -loss[2])[: 3 * self.words]
         for row, place, number in losses:
             self.axes.axvline(place, color=RED, linewidth=1.0, linestyle=(0, (1, 2)), zorder=2)
             if (row, place, number) in words:
                 low, high = self.axes.get_ylim()
                 # They stand before the line.
                 above = self.values[row - 1] < (low + high) / 2.0
-                # Clear of the words of a collapse.
+                # Clear of the words of a collapse, four lines.
                 places = collapse_places(self.response)
-                room = COLLAPSE_LINES * self.text * (places is not None and self._above(places[1]) == above)
+                room = 4.2 * self.text * (places is not None and self._above(places[1]) == above)
                 style = {"ha": "right", "va": "top" if above else "bottom", "rotation": 90, "color": RED, "bbox": PATCH}
                 told = f"{mechanics.counted(number, 'block')} lost"
                 offset = -3, -room if above else room
@@ -280,7 +260,7 @@ class _Plot:
 
     def _above(self, middle: float) -> bool:
         """Whether the words of a collapse stand above the curve, on the side that it leaves free."""
-        near = self.total >= middle - WORDS * (self.total[-1] - self.total[0])
+        near = self.total >= middle - 0.35 * (self.total[-1] - self.total[0])
         beside = self.values[near & np.isfinite(self.values)]
         foot, head = self.axes.get_ylim()
         return len(beside) > 0 and bool(head - beside.max() > beside.min() - foot)
@@ -297,7 +277,7 @@ class _Plot:
     def _single(self) -> None:
         """Draw one limit load: rigid up to it, then a mechanism, over displacements as small as first order allows."""
         axes, text = self.axes, self.text
-        reach = SMALL * float(np.ptp(self.response.assembly.vertices, axis=0).max())
+        reach = SWING * float(np.ptp(self.response.assembly.vertices, axis=0).max())
         factor, unit = (1e3, "mm") if reach < 0.1 else (1.0, "m")
         reach *= factor
         axes.set_xlim(0.0, reach)
@@ -320,7 +300,7 @@ class _Plot:
         for first, stop in edges.reshape(-1, 2).tolist():
             low, high = total[max(first - 1, 0)], total[min(stop, len(total) - 1)]
             self.axes.axvspan(low, high, color=GREY, alpha=0.15, linewidth=0)
-            wide = high - low > WIDE_BAND * (total[-1] - total[0])
+            wide = high - low > 0.2 * (total[-1] - total[0])
             style: dict[str, Any] = {"ha": "center", "va": "center", "rotation": 0 if wide else 90, "color": GREY}
             middle = (low + high) / 2.0, 0.5
             _word(self.axes, "unbounded", middle, (0, 0), AT, fontsize=0.9 * self.text, **style)

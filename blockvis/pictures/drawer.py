@@ -63,35 +63,11 @@ if TYPE_CHECKING:
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
 
-#: Something falls where a corner moves by more pixels than this in so many seconds: the badge says so.
-VISIBLE, MOMENT = 1.0, 0.12
-
-#: The scale of the forces is taken from this many increments.
-FORCES_OF = 100
-
-#: Arrows end so far off the middle of a hinge, in heights of the text: its dot would hide their heads.
-DOT = 0.5
-
-#: Blocks in space are so transparent where forces are drawn inside them.
-GLASS = 0.35
-
-#: Length of the arrows at the supports in space, as a part of the larger side of what is drawn.
-ARROW_IN_SPACE = 0.09
-
-#: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
-CELL, CELL_IN_SPACE = 0.07, 0.09
-
-#: Arrows of a mechanism shorter than this fraction of the picture are specks, and left out.
-SPECK = 0.01
-
 #: Entry of the legend of blocks that the structure has lost.
 LOST = "lost block"
 
 #: Empty border around free blocks in space, as a part of the larger side of the picture.
 MARGIN = 0.03
-
-#: Pictures in space grow downwards by so much of their larger side to show the ground of a fall.
-FLOOR = 0.15
 
 #: Supports in space are shown whole where the picture is no larger for it than this many times the blocks: part of a
 #: slab that ends just outside looks like a mistake.
@@ -184,12 +160,13 @@ class Drawer:
         self._plane = plane_of(assembly, look.cut, self._views[0] if self._views else None)
         self.ties = DrawnTies(response, self._plane)
         numbers = np.array([k for k, i in enumerate(increments) if matters(i, response)], dtype=int)
-        self._seen = _Series(sampled=frozenset(evenly(numbers, FORCES_OF).tolist()))
+        # A hundred states are enough for the scale of the forces.
+        self._seen = _Series(sampled=frozenset(evenly(numbers, 100).tolist()))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
         self.live = LiveLoads(response, increments, float(frame.size.max()), self._plane)
-        self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(frame.size.max())
+        self._arrow = (ARROW if self._flat else 0.09) * float(frame.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
         ends = np.concatenate([heads, *self._arrow_ends(frame, extra), tied])
@@ -219,7 +196,6 @@ class Drawer:
         self._drawn_at: solver.Pose | None = None
         #: Ends (n, 2, d) [m] of the arrows in the picture, by layer: labels leave them free.
         self._arrows: dict[str, np.ndarray] = {}
-        self._keys: list[Key] | None = None
 
     def _chosen_views(self) -> tuple[View, ...]:
         """Find from where blocks in space are drawn; films have one view."""
@@ -244,7 +220,7 @@ class Drawer:
         if self._flat or self.fall is None:
             return frame
         feet = self._projected(self.assembly.vertices * [1.0, 1.0, 0.0] + [0.0, 0.0, self.fall.ground])
-        lowest = frame.low - [0.0, FLOOR * float(frame.size.max())]
+        lowest = frame.low - [0.0, 0.15 * float(frame.size.max())]
         return frame.holding(np.clip(feet, lowest, frame.high)[feet[:, 1] < frame.low[1]])
 
     @property
@@ -263,7 +239,8 @@ class Drawer:
         # VTK takes seconds to import, and pictures in the plane need none.
         from .paired_scenes import PairedScenes
 
-        opacity = 1.0 if self.look.forces == "none" else GLASS
+        # Forces are drawn inside the blocks.
+        opacity = 1.0 if self.look.forces == "none" else 0.35
         pair = PairedScenes(
             self.assembly, self._views, frame, self.sheet, self.fill, opacity=opacity, fine=self._still, cut=self._plane
         )
@@ -404,13 +381,13 @@ class Drawer:
         )
 
     def _moves(self, time: float) -> bool:
-        """Whether something moves visibly after a time [s] of the fall, or in the last moment that is known of it."""
+        """Whether something moves by a pixel after a time [s] of the fall, or in the last 0.12 s known of it."""
         assert self.fall is not None
         end = float(self.fall.times[-1])
-        start = max(min(time, end - MOMENT), 0.0)
+        start = max(min(time, end - 0.12), 0.0)
         # Until the end: what is tall begins to fall slower than is seen in a moment.
         now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (start, end))
-        return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > VISIBLE * self.scene.pixel)
+        return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > self.scene.pixel)
 
     def show_motion(self, swing: Swing) -> None:
         """Show by tints, edges and arrows how the parts of a mechanism move.
@@ -430,7 +407,8 @@ class Drawer:
         into = into_sight(self._plane, tails)
         tails, tips = tails + into, tips + into
         lengths = np.linalg.norm(tips - tails, axis=1)
-        shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
+        # Shorter ones are specks.
+        shown = lengths >= min(0.01 * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
         tails, tips = tails[shown], tips[shown]
         self._arrows["motion"] = np.stack([tails, tips], axis=1)
         self._swing, self.tints = swing, mechanism_colours(self.assembly, self.fill, swing)
@@ -444,7 +422,7 @@ class Drawer:
             return [part for part in parts if kept[part].any()]
         positions = swing.increment.pose.positions
         moves = np.flatnonzero((swing.parts >= 0) & kept)
-        width = (CELL if self._flat else CELL_IN_SPACE) * self.scene.frame.size.max()
+        width = (0.07 if self._flat else 0.09) * self.scene.frame.size.max()
         place = self._projected(positions[moves])[:, :2] / width
         cell = np.floor(place)
         # Of the blocks behind each other the first is seen; else arrows stand as evenly as blocks allow.
@@ -454,30 +432,27 @@ class Drawer:
         _, first = np.unique(cell, axis=0, return_index=True)
         return [moves[[k]] for k in first]
 
+    @cached_property
     def keys(self) -> list[Key]:
         """Return what is marked in any of the increments, what comes and goes first."""
-        if self._keys is None:
-            keys = self._keys_of_tints()
-            if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
-                keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
-            keys += [*self._keys_of_joints(), *self.ties.keys()]
-            if not self._flat and self.response.settlements:
-                traced = hiding_supports(self.assembly, self._views[0])[self.assembly.moving].all()
-                keys.append(Key("line" if traced else "area", "moving support", palette.MOVING, layers=("moving",)))
-            if self.response.loads.fills:
-                kind = "area" if self._flat else "line"
-                keys.append(
-                    Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
-                )
-            if self.live.largest > 0.0:
-                keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
-            if self._drawn_at is not None:
-                layers = ("motion outline", "motion top")
-                what = "motion" if self._flat else "motion, blocks drawn after it"
-                keys.append(Key("line", f"{what} (not to scale)", palette.SETTLEMENT, layers=layers))
-                keys.append(Key("line", "at equilibrium", palette.GHOST, layers=("before",)))
-            self._keys = [*keys, *self._keys_of_forces()]
-        return self._keys
+        keys = self._keys_of_tints()
+        if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
+            keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
+        keys += [*self._keys_of_joints(), *self.ties.keys()]
+        if not self._flat and self.response.settlements:
+            traced = hiding_supports(self.assembly, self._views[0])[self.assembly.moving].all()
+            keys.append(Key("line" if traced else "area", "moving support", palette.MOVING, layers=("moving",)))
+        if self.response.loads.fills:
+            kind = "area" if self._flat else "line"
+            keys.append(Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",)))
+        if self.live.largest > 0.0:
+            keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
+        if self._drawn_at is not None:
+            layers = ("motion outline", "motion top")
+            what = "motion" if self._flat else "motion, blocks drawn after it"
+            keys.append(Key("line", f"{what} (not to scale)", palette.SETTLEMENT, layers=layers))
+            keys.append(Key("line", "at equilibrium", palette.GHOST, layers=("before",)))
+        return [*keys, *self._keys_of_forces()]
 
     def _keys_of_joints(self) -> list[Key]:
         marks, widest = self._seen.marks, self._seen.widest
@@ -520,10 +495,10 @@ class Drawer:
         falling = increment.status == solver.Status.FALLING
         untinted = [] if self._acts(increment) else self._keys_of_tints()
         if not (increment.fallen & ~increment.removed).any():
-            untinted += [key for key in self.keys() if key.text == LOST]
+            untinted += [key for key in self.keys if key.text == LOST]
         return [
             key
-            for key in self.keys()
+            for key in self.keys
             if key not in untinted and (self.scene.holds(*key.layers) if key.layers else bool(key.kind) or not falling)
         ]
 
@@ -673,7 +648,8 @@ class Drawer:
             return
         tails, tips = self.live.arrows(increment, shown)
         if self._flat and len(dots) and len(tips):
-            clear = DOT * self.sheet.text * self.scene.pixel
+            # The dot of a hinge would hide their heads.
+            clear = 0.5 * self.sheet.text * self.scene.pixel
             at_dot = np.linalg.norm(tips[:, None] - dots, axis=2).min(axis=1) < clear
             along = (tips - tails) / np.maximum(np.linalg.norm(tips - tails, axis=1), 1e-300)[:, None]
             back = clear * at_dot[:, None] * along

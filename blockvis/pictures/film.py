@@ -17,8 +17,8 @@ from .captions import matters
 from .drawer import Drawer
 
 #: Seconds for which the last equilibrium and the end of the film are held, and those for which a loss is told, or a
-#: phase at least takes.
-PAUSE, END, TOLD = 0.5, 0.8, 1.0
+#: phase at least takes; seconds of a path where nobody says how long it is played.
+PAUSE, END, TOLD, PATH_SECONDS = 0.5, 0.8, 1.0, 6.0
 
 #: Nothing moves from one frame of a fall to the next where no corner moves by more than this [pixels].
 STILL = 0.3

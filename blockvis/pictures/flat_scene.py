@@ -40,9 +40,6 @@ THINNEST = 1.2
 
 Colour = tuple[int, int, int]
 
-#: So many parts of a mechanism have outlines of where it takes them: more would cover the blocks.
-MOST_OUTLINES = 6
-
 
 class FlatScene(Scene):
     """Blocks of the plane and their marks.
@@ -193,12 +190,10 @@ class FlatScene(Scene):
             self.polygons(f"{layer} {name}/head", heads, fill)
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
-        """Draw the largest parts of a mechanism as outlines where it takes them; the blocks stay where they are."""
+        """Draw the parts of a mechanism, where they are few, as outlines where it takes them; the blocks stay."""
         if swing.n_parts <= MOST_PARTS:
             corners = mechanics.moved_vertices(self.assembly, swing.displaced)
-            # Parts are numbered from the largest on.
-            largest = np.where(swing.parts < MOST_OUTLINES, swing.parts, -1)
-            outlines = part_outlines(self.assembly, corners, largest)
+            outlines = part_outlines(self.assembly, corners, swing.parts)
             self.lines("motion outline", outlines, palette.SETTLEMENT, self.usual_height / 600.0)
         self.arrows("motion", tails, tips, palette.SETTLEMENT)
         return swing.increment.pose
@@ -213,14 +208,14 @@ class FlatScene(Scene):
     def show_ground(self, height: float) -> None:
         """Draw the ground of a fall over the whole width, hatched below and up to supports, behind everything."""
         self._floor = height
-        tick = self.usual_height / 60.0 * self.pixel
+        tick, thin = self._hatching
         (left, _), (right, _) = self.frame.low, self.frame.high
         ends = np.array([[[left, height], [right, height]]])
         self.lines("earth", ends, palette.HATCH, max(1.2, self.usual_height / 400.0))
         x = np.arange(left, right + tick, tick)
         level = np.broadcast_to([height, height - tick], (len(x), 2))
         ticks = np.stack([np.stack([x, x - tick], axis=1), level], axis=2)
-        self.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.usual_height / 1000.0))
+        self.lines("earth/hatch", ticks, palette.HATCH, thin)
 
     def _show_earth(self, corners: np.ndarray) -> None:
         """Hatch what lies below supports that are ground, as they reach below all free blocks: they would hang in air.
@@ -233,7 +228,7 @@ class FlatScene(Scene):
         below = ground[assembly.block_of_vertex] & (following[:, 0] > corners[:, 0]) & (corners[:, 1] > self._floor)
         top = np.stack([corners[below], following[below]], axis=1)
         foot = np.stack([top[..., 0], np.full(top.shape[:2], self._floor)], axis=2)
-        spacing, thin = self.usual_height / 60.0 * self.pixel, max(0.7, self.usual_height / 1000.0)
+        spacing, thin = self._hatching
         found = [hatched(of, spacing, 1.0) for of in shapely.polygons(np.hstack([top, foot[:, ::-1]]))]
         sides = np.stack([top, foot], axis=2).reshape(-1, 2, 2)
         self.lines("earth/under", np.concatenate([sides, *found]), palette.HATCH, thin)
@@ -281,17 +276,22 @@ class FlatScene(Scene):
         """Pixels; thinner where the blocks are small, so that a façade does not turn dark."""
         return float(np.clip(self.assembly.block_size / self.pixel / 25.0, 0.6, self.usual_height / 540.0))
 
+    @property
+    def _hatching(self) -> tuple[float, float]:
+        """Distance [m] and thickness [pixels] of the lines that hatch ground and supports."""
+        return self.usual_height / 60.0 * self.pixel, max(0.7, self.usual_height / 1000.0)
+
     def _hatch(self) -> None:
         """Hatch supports as laid out, in the picture and around it."""
         supports = np.flatnonzero(~self.assembly.free)
         outlines = [shapely.Polygon(self.assembly.outline(block)) for block in supports.tolist()]
         around = shapely.box(*(self.frame.low - self.frame.size), *(self.frame.high + self.frame.size))
-        spacing = self.usual_height / 60.0 * self.pixel
+        spacing, thin = self._hatching
         found = [hatched(shapely.intersection(outline, around), spacing, 1.0) for outline in outlines]
         lines = np.concatenate([np.zeros((0, 2, 2)), *found])
         self._hatched = lines.reshape(-1, 2), np.repeat(supports, [2 * len(of) for of in found])
         if len(lines):
-            self.lines("hatch", lines, palette.HATCH, max(0.7, self.usual_height / 1000.0))
+            self.lines("hatch", lines, palette.HATCH, thin)
 
 
 class _Layer:

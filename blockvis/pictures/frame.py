@@ -20,25 +20,20 @@ from solver import mechanics
 from . import palette
 from .surface import left_blocks
 
-#: Height of the text as a fraction of the side of a square as large as the picture, and of the width: as wide as the
-#: text of an A4 page, 174 mm, the smallest letters then have 7 points. Its least size in pixels.
-TEXT_FRACTION, OF_WIDTH, SMALLEST_TEXT = 1.0 / 48.0, 1.0 / 62.0, 12
-
 #: The smallest letters, in heights of the text.
 SMALL = 0.9
 
 #: Sheets narrower than this, in heights of the text, have one more row in the legend.
 NARROW = 48.0
 
-#: Heights of what is above and below the blocks, in those of the text, this of usual and of narrow sheets, and rows of
-#: the caption below its title.
-HEADER, FOOTER, ROWS = 5.1, (3.3, 4.6), 2
+#: Heights of what is above and below the blocks, in those of the text, this of usual and of narrow sheets.
+HEADER, FOOTER = 5.1, (3.3, 4.6)
 
 #: Middle of a title of one and of two rows, and those of the first row below it and from each to the next.
 TITLE, DETAIL = (0.72, 0.55), ((2.0, 1.2), (2.7, 1.05))
 
-#: Widths of curve and colour bar beside the blocks, and the largest height of the curve, in heights of the text.
-CURVE, BAR, HIGHEST_CURVE = 23.0, 7.6, 29.0
+#: Widths of curve and colour bar beside the blocks, in heights of the text.
+CURVE, BAR = 23.0, 7.6
 
 #: Width and height of a still and of a film [pixels]; one in other proportions has as many, and is no wider.
 STILL_SIZE, FILM_SIZE = (1920, 1080), (1280, 720)
@@ -99,7 +94,7 @@ class Sheet:
     ) -> None:
         self.size = size
         width, height = size
-        self.text = max(SMALLEST_TEXT, round(text_height(across * width, height)))
+        self.text = max(12, round(text_height(across * width, height)))
         self.pad = max(6, round(0.9 * self.text))
         self._narrow = width < NARROW * self.text
         self.header = round(HEADER * self.text)
@@ -111,7 +106,8 @@ class Sheet:
         self.inside = (0, self.header, width - right, height - self.footer)
         if min(self.inside_size) < 1:
             raise ValueError(f"size is {width} × {height} pixels, which leave the blocks none; give more")
-        aside = max((self.inside_size[1] - round(HIGHEST_CURVE * self.text)) // 2, 0)
+        # A curve is no higher than 29 letters.
+        aside = max((self.inside_size[1] - round(29.0 * self.text)) // 2, 0)
         #: The same of the curve.
         self.beside = (width - beside, self.header + aside, width, height - self.footer - aside)
         self._page, self._page_of = Image.new("RGB", size), tuple[object, ...]()
@@ -164,7 +160,8 @@ class Sheet:
         self._legend(draw, keys, end + 2 * self.pad)
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
-        room = [self._room("")] * ROWS
+        # Two rows below the title.
+        room = [self._room("")] * 2
         if not beside_title:
             room[-1] = self._room(badge)
         rows, font = fitting_rows(detail, round(SMALL * self.text), room)
@@ -434,11 +431,8 @@ class Frame:
     def holding(self, points: np.ndarray) -> Frame:
         """Grow the frame where points (n, 2) [m] lie beyond it, with a margin."""
         margin = 0.02 * float(self.size.max())
-        if len(points) == 0:
-            return self
-        return Frame(
-            np.minimum(self.low, points.min(axis=0) - margin), np.maximum(self.high, points.max(axis=0) + margin)
-        )
+        low, high = points.min(axis=0, initial=np.inf) - margin, points.max(axis=0, initial=-np.inf) + margin
+        return Frame(np.minimum(self.low, low), np.maximum(self.high, high))
 
     def fitted(self, width: int, height: int) -> Frame:
         """Grow the frame to the proportions of a picture of ``width`` × ``height`` pixels."""
@@ -449,8 +443,12 @@ class Frame:
 
 
 def text_height(width: int, height: int) -> float:
-    """Height [pixels] of the text of a sheet of so many pixels."""
-    return max(float(np.sqrt(width * height)) * TEXT_FRACTION, width * OF_WIDTH)
+    """Height [pixels] of the text of a sheet of so many pixels.
+
+    It is a part of the side of a square as large, or of the width: as wide as the text of an A4 page, 174 mm, the
+    smallest letters then have 7 points.
+    """
+    return max(float(np.sqrt(width * height)) * (1.0 / 48.0), width * (1.0 / 62.0))
 
 
 def sheet_size(

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 #: Names are written where they fit into their block at this size [points]; smaller ones cannot be read.
 SMALLEST_TEXT, LARGEST_TEXT = 6.0, 9.0
 
-#: Width and smallest and largest height of the drawing on paper [in], and dots per inch.
-WIDTH, HEIGHTS, DPI = 10.0, (1.6, 14.0), 150
+#: Width and smallest and largest height of the drawing on paper [in].
+WIDTH, HEIGHTS = 10.0, (1.6, 14.0)
 
-#: Characters of a line above the drawing, and most lines there.
-LINE, MOST_LINES = 118, 6
+#: Most lines above the drawing.
+MOST_LINES = 6
 
 #: Pixels of the width of blocks in space: more than on paper, which smooths their edges.
 PIXELS = 2000
@@ -103,7 +103,7 @@ class _Canvas:
 @plain_text
 def draw_contents(contents: Contents, path: str | Path) -> Path:
     """Draw what a drawing holds on a sheet with title, findings and legend, as .png, .svg or .pdf."""
-    lines = [line.strip(" ·") for text in contents.findings for line in textwrap.wrap(text, LINE)]
+    lines = [line.strip(" ·") for text in contents.findings for line in textwrap.wrap(text, 118)]
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], f"{lines[MOST_LINES - 1]} ..."]
     figure = Figure(layout="constrained")
@@ -118,7 +118,7 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
     figure.set_figheight(figure.get_figheight() + 0.5 + 0.19 * (len(lines) + (len(keys) + 3) // 4))
     figure.suptitle("\n".join([contents.title, *lines]), x=0.01, ha="left", fontsize=9.5)
     figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False, fontsize=8.5)
-    return saved(figure, path, DPI)
+    return saved(figure, path, 150)
 
 
 def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:

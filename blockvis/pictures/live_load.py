@@ -19,15 +19,9 @@ from .solid_view import into_sight, kept_blocks
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5
 
-#: Length of the longest arrow, as a fraction of the picture, and of arrows of as many equal loads as are not too close.
-LENGTH, MOST_LONG = 0.11, 24
-
-#: No arrow is shorter than this fraction of the longest: it would not be seen.
-SHORTEST = 0.125
-
-#: Arrows of at most so many loads, in space of the largest. In the plane those of more are resultants, each of a grid
-#: cell of a fraction of the picture; in space these would lie inside the structure.
-MOST_ARROWS, CELL = 100, 0.12
+#: Arrows of at most so many loads, in space of the largest. In the plane those of more are resultants, each of a cell
+#: of a grid; in space these would lie inside the structure.
+MOST_ARROWS = 100
 
 
 @dataclass(frozen=True)
@@ -88,7 +82,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         entries = zip(blocks.tolist(), inside, strict=True)
         points = np.reshape([_entry(assembly, pose, b, live[b], inside=within) for b, within in entries], (-1, 2))
     load = LiveLoad(points, forces[blocks], blocks, pose, len(acting))
-    return load if len(blocks) <= MOST_ARROWS else _gathered(load, CELL * extent)
+    return load if len(blocks) <= MOST_ARROWS else _gathered(load, 0.12 * extent)
 
 
 def _largest(numbers: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -148,7 +142,8 @@ class LiveLoads:
                 self._loads[place] = replace(load, forces=load.forces / (load.largest or 1.0))
         self.largest = max((load.largest for load in self._loads.values()), default=0.0)
         together = max((float(np.linalg.norm(load.forces)) for load in self._loads.values()), default=0.0)
-        self._scale = LENGTH * extent / (max(self.largest, together / MOST_LONG**0.5) or 1.0)
+        # Of more than 24 equal loads long arrows are too close.
+        self._scale = 0.11 * extent / (max(self.largest, together / 24**0.5) or 1.0)
 
     @property
     def words(self) -> str:
@@ -180,7 +175,7 @@ class LiveLoads:
     def _drawn(self, load: LiveLoad) -> np.ndarray:
         """(n, d) array [m]: arrows to scale, but for those that would be too short."""
         sizes, largest = np.linalg.norm(load.forces, axis=1), load.largest or 1.0
-        longer = np.maximum(sizes, SHORTEST * largest) / np.maximum(sizes, ROUNDING * largest)
+        longer = np.maximum(sizes, 0.125 * largest) / np.maximum(sizes, ROUNDING * largest)
         return np.asarray(self._scale * longer[:, None] * load.forces)
 
     def _load_at(self, increment: solver.Increment) -> tuple[LiveLoad, float]:

@@ -31,10 +31,6 @@ SMALLEST_RESULTANT = 2e-3
 #: middle: where mortar is bent or sheared, it crosses the line of the joint far off, or nowhere.
 BESIDE = 2.0
 
-#: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
-#: the last digit leaves slivers otherwise.
-SLIVER = 0.01
-
 #: Joints open by less than this fraction of the block size are drawn half as wide.
 FINE_CRACK = 0.01
 
@@ -66,7 +62,8 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
     them.
     """
     edges = [np.zeros((0, 2, 2))]
-    margin = SLIVER * assembly.block_size
+    # Grown, merged and shrunk back: between faces that touch, the last digit leaves slivers otherwise.
+    margin = 0.01 * assembly.block_size
     for part in range(int(parts.max(initial=-1)) + 1):
         blocks = np.flatnonzero(parts == part)
         outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
@@ -227,17 +224,14 @@ def hinge_ends(assembly: solver.Assembly, increment: solver.Increment, mechanism
     contacts = increment.contacts
     if assembly.dimension == 2:
         return np.stack([mechanism.hinge_points, mechanism.hinge_points], axis=1)
-    pairs, joint = contacts.joints()
-    count = assembly.n_blocks
-    known = pairs[:, 0] * count + pairs[:, 1]
+    _, joint = contacts.joints()
     spins = increment.velocity[:, 3:]
     turning = np.linalg.norm(spins[contacts.block_a] - spins[contacts.block_b], axis=1) * assembly.block_size
     stays = np.abs(increment.displacements[:, 0]) <= ON_HINGE * turning
     stays &= contacts.gaps <= TOUCHING * assembly.block_size
     ends = np.zeros((len(mechanism.hinges), 2), dtype=int)
-    for k, ((a, b), point) in enumerate(zip(mechanism.hinges, mechanism.hinge_points, strict=True)):
-        here = np.flatnonzero(stays & (joint == np.searchsorted(known, a * count + b)))
-        here = np.union1d(here, [point])
+    for k, point in enumerate(mechanism.hinge_points):
+        here = np.union1d(np.flatnonzero(stays & (joint == joint[point])), [point])
         places = contacts.points[here]
         apart = np.linalg.norm(places[:, None] - places[None], axis=2)
         ends[k] = here[list(np.unravel_index(int(apart.argmax()), apart.shape))]
@@ -381,44 +375,29 @@ def sliding_lines(
 
     ``k`` are the numbers of the contact points that slide, ``points`` (n_contacts, 2) [m] where all of them are drawn.
     """
-    if len(k) == 0:
-        return np.zeros((0, 2, 2))
-    pairs, which = contacts[k].joints()
-    n = len(pairs)
-    first = np.zeros(n, dtype=int)
-    first[which[::-1]] = k[::-1]
-    tangent = contacts.frames[first, 1]
-    place = ((points[k] - points[first][which]) * tangent[which]).sum(axis=1)
-    lowest, highest = np.zeros(n), np.zeros(n)
-    np.minimum.at(lowest, which, place)
-    np.maximum.at(highest, which, place)
-    # A joint that slides on one point only still needs a length to be seen, towards the others that it touches at.
-    least = np.minimum(SHORTEST * assembly.block_size, assembly.widths[pairs].min(axis=1))
-    short = np.maximum(least - (highest - lowest), 0.0)
-    face_low, face_high = _extents(contacts, points, pairs, points[first], tangent)
-    alone = face_high - face_low < short
-    lowest = np.where(alone, lowest - short / 2.0, np.maximum(lowest - short, np.minimum(face_low, lowest)))
-    highest = np.where(alone, highest + short / 2.0, np.minimum(highest + short, np.maximum(face_high, highest)))
-    base = points[first]
-    return np.stack([base + lowest[:, None] * tangent, base + highest[:, None] * tangent], axis=1)
+    pairs, which = contacts.joints()
+    touching = np.split(np.argsort(which, kind="stable"), np.cumsum(np.bincount(which, minlength=len(pairs)))[:-1])
+    found = []
+    for joint in np.unique(which[k]).tolist():
+        own = k[which[k] == joint]
+        base, tangent = points[own[0]], contacts.frames[own[0], 1]
+        # A joint that slides on one point only still needs a length to be seen, towards the others that it touches at.
+        least = min(SHORTEST * assembly.block_size, float(assembly.widths[pairs[joint]].min()))
+        low, high = _extent(points[own] - base, tangent)
+        first, last = _extent(points[touching[joint]] - base, tangent)
+        short = max(least - (high - low), 0.0)
+        if last - first < short:
+            low, high = low - short / 2.0, high + short / 2.0
+        else:
+            low, high = max(low - short, first), min(high + short, last)
+        found.append(base + np.array([[low], [high]]) * tangent)
+    return np.array(found).reshape(-1, 2, 2)
 
 
-def _extents(
-    contacts: mechanics.Contacts, points: np.ndarray, pairs: np.ndarray, base: np.ndarray, tangent: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest place, (n,) [m], of all contact points of pairs of blocks along their tangents."""
-    every, which = contacts.joints()
-    count = int(every.max(initial=0)) + 1
-    row = np.searchsorted(every[:, 0] * count + every[:, 1], pairs[:, 0] * count + pairs[:, 1])
-    number = np.full(len(every), -1)
-    number[row] = np.arange(len(pairs))
-    k = number[which]
-    here = k >= 0
-    place = ((points[here] - base[k[here]]) * tangent[k[here]]).sum(axis=1)
-    low, high = np.full(len(pairs), np.inf), np.full(len(pairs), -np.inf)
-    np.minimum.at(low, k[here], place)
-    np.maximum.at(high, k[here], place)
-    return low, high
+def _extent(arms: np.ndarray, tangent: np.ndarray) -> tuple[float, float]:
+    """Lowest and highest of arms (n, 2) [m] along a tangent."""
+    along = (arms * tangent).sum(axis=1)
+    return float(along.min()), float(along.max())
 
 
 def arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:

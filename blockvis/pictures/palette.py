@@ -56,7 +56,7 @@ PARTS = np.array(
 #: Edges of the blocks and the main cracks in a drawing of cracks, the widest first: red, blue, green,
 #: violet, ochre, teal.
 PALE_OUTLINE = (204, 199, 191)
-SURVEYED = ((190, 30, 30), (20, 92, 168), (46, 125, 50), (126, 55, 178), (184, 110, 0), (0, 121, 125))
+SURVEYED = (WARNING, FORCE, (46, 125, 50), SLIDING, (184, 110, 0), (0, 121, 125))
 #: Of the forces of ties over a settlement; blue is the reaction, and red what fails.
 TIE_SHADES = (*SURVEYED[2:], *SURVEYED[:2])
 
@@ -70,7 +70,7 @@ STILL = 0.45
 SHADE = 0.035
 
 #: Cracks in space, from narrow to wide: all stand out from stone.
-CRACKS = np.array([(244, 162, 97), (226, 78, 27), (122, 16, 16)], dtype=float)
+CRACKS = np.array([(244, 162, 97), OPEN, (122, 16, 16)], dtype=float)
 
 #: Pale to deep indigo, even in lightness, and light enough at its end for outlines to show: no support that moves, and
 #: no arrow on the blocks, has its hue.
@@ -111,9 +111,10 @@ def role_colours(assembly: solver.Assembly, settles: bool = True) -> np.ndarray:
     return fill
 
 
-def pale(fill: np.ndarray, blocks: np.ndarray, left: float) -> np.ndarray:
-    """(n_blocks, 3) uint8 array: fills of some blocks, (n_blocks,) bool, with a part of their colour ``left``."""
-    return np.where(blocks[:, None], np.rint(left * fill + (1.0 - left) * np.array(PAPER)), fill).astype(np.uint8)
+def pale(fill: np.ndarray, blocks: np.ndarray | bool, left: float) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills of all blocks, or some (n_blocks,), with a part of their colour ``left``."""
+    paler = np.rint(left * fill + (1.0 - left) * np.array(PAPER))
+    return np.where(np.reshape(blocks, (-1, 1)), paler, fill).astype(np.uint8)
 
 
 def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:

@@ -30,21 +30,6 @@ from .surface import section_of, sharp_edges, triangles_of
 from .swing import MOST_PARTS, Swing
 from .ties import DASH, Strands, dashed
 
-#: How much of the light comes from all sides, and from the lamp above the left shoulder.
-AMBIENT, DIFFUSE = 0.58, 0.50
-
-#: Where the lamp stands, to the right, up and to the eye.
-LAMP = (-0.45, 0.85, 1.2)
-
-#: Samples of a pixel of frames of a film, and how many times as large a still is drawn, to be made smaller.
-SAMPLES, OVER = 4, 2
-
-#: Corners darken over this part of the larger side of what is shown; a hair of it keeps plane faces free of grain.
-SHADE_REACH, SHADE_HAIR = 0.1, 0.008
-
-#: Cut faces are so much darker than the faces of their blocks.
-CUT_SHADE = 0.82
-
 #: What is seen lies nearer than this part of the picture's size to the point that is looked for.
 SAME_DEPTH = 0.005
 
@@ -54,20 +39,8 @@ IN_FRONT_OF_ALL = 1_000_000.0
 #: Layers that are drawn in front of all, as ties are by their dashes.
 OVER_BLOCKS = ("force", "crushing", "tie")
 
-#: Radius of the ground of a fall, in larger sides of the picture, and the part of it from where on it fades.
-GROUND, FADES = 0.75, 0.45
-
-#: Ground and supports that go beyond a picture fade over this part of its smaller side: free blocks end before it.
-EDGE = 0.028
-
-#: Faces look down or up where their normals do by this much.
-LEVEL = 0.5
-
 #: Points of a triangle that are looked for, as parts (n, 3) of its corners: of what is nearly hidden a corner is seen.
 _INSIDE = np.array([(i, j, 8 - i - j) for i in range(9) for j in range(9 - i)]) / 8.0 * 0.94 + 0.02
-
-#: The arrows of a mechanism are longer than the way it is drawn by, to be seen on the blocks.
-LONGER = 1.6
 
 
 @dataclass(frozen=True)
@@ -105,13 +78,15 @@ class SolidScene(Scene):
     ) -> None:
         super().__init__(assembly, frame, size)
         self.view = view
-        self._over = OVER if fine else 1
+        # A still is drawn twice as large, to be made smaller.
+        self._over = 2 if fine else 1
         self._plotter = _plotter((self._over * size[0], self._over * size[1]))
         if fine and opacity == 1.0:
             extent = float(framed(assembly, [solver.Pose.initial(assembly)], axes=view.axes[:2]).size.max())
             # Depths are rounded by the whole, which wide supports make larger than what is shown.
             whole = max(extent, float(np.ptp(assembly.vertices, axis=0).max()))
-            self._plotter.enable_ssao(radius=SHADE_REACH * extent, bias=SHADE_HAIR * whole, kernel_size=16)
+            # A hair of it keeps plane faces free of grain.
+            self._plotter.enable_ssao(radius=0.1 * extent, bias=0.008 * whole, kernel_size=16)
         self._hidden_hinges = hidden_hinges
         #: Diagonal of the largest support [m].
         self._support = _largest_support(assembly)
@@ -128,7 +103,7 @@ class SolidScene(Scene):
         self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), self._triangles[solid])
         self._surface.cell_data["colour"] = block_fill[self._faced]
         surface = self._plotter.add_mesh(
-            self._surface, scalars="colour", rgb=True, ambient=AMBIENT, diffuse=DIFFUSE, specular=0.0,
+            self._surface, scalars="colour", rgb=True, ambient=0.58, diffuse=0.5, specular=0.0,
             interpolation="flat", opacity=opacity, reset_camera=False, render=False, show_scalar_bar=False,
         )  # fmt: skip
         self._clip(surface)
@@ -136,7 +111,8 @@ class SolidScene(Scene):
         self.edges = sharp_edges(assembly.polyhedra)
         traced = self._outlined[assembly.block_of_vertex[self.edges[:, 0]]]
         self._edges, self._traces = (
-            pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges[of])) for of in (~traced, traced)
+            pv.PolyData(np.array(assembly.vertices), lines=pv.CellArray.from_regular_cells(self.edges[of]))
+            for of in (~traced, traced)
         )
         self._shadow: pv.PolyData | None = None
         # Height of the ground of a fall, vertices of supports, and those under what stands on it.
@@ -161,17 +137,11 @@ class SolidScene(Scene):
         self._surface.points = corners
         self._edges.points = self._traces.points = corners
         if self._shadow is not None:
-            flat, faces = corners, None
+            left = self._surface
             if self._cut is not None:
                 # What the section leaves out throws none: the halves that are left would seem to float.
-                left = self._surface.clip(normal=-self._cut[1], origin=self._cut[0]).triangulate()
-                flat, faces = left.points, left.faces
-            flat = np.array(flat)
-            flat[:, 2] = self._floor
-            if faces is None:
-                self._shadow.points = flat
-            else:
-                self._shadow.copy_from(pv.PolyData(flat, faces=faces))
+                left = left.clip(normal=-self._cut[1], origin=self._cut[0]).triangulate()
+            self._shadow.copy_from(pv.PolyData(left.points * (1.0, 1.0, 0.0) + (0.0, 0.0, self._floor), left.faces))
         if block_fill is not None:
             self._fill = block_fill
             self._surface.cell_data["colour"] = block_fill[self._faced]
@@ -182,7 +152,8 @@ class SolidScene(Scene):
             self.lines("section edge", ends, palette.INK, max(2.0 * self._thin, 1.2), forward=2.0)
             faces = [ring for ring, owner in zip(outlines, owners.tolist(), strict=True) if not self._outlined[owner]]
             owners = owners[~self._outlined[owners]]
-            shades = (CUT_SHADE * self._fill[owners]).astype(np.uint8)
+            # Cut faces are darker than the faces of their blocks.
+            shades = (0.82 * self._fill[owners]).astype(np.uint8)
             colours = np.repeat(shades, [len(face) for face in faces], axis=0)
             self.polygons("section", faces, colours, forward=1.0)
             self._sections = list(zip(faces, owners.tolist(), strict=True))
@@ -197,12 +168,13 @@ class SolidScene(Scene):
         It is under the middle of what stands, has no end but fades, and lies behind all, as nothing is below it:
         supports end in it, and those below the structure reach down to it, which are ground as well.
         """
-        corners, radius = self.assembly.vertices[:, :2], GROUND * float(self.frame.size.max())
+        corners, radius = self.assembly.vertices[:, :2], 0.75 * float(self.frame.size.max())
         stands = corners[self.assembly.free[self.assembly.block_of_vertex]]
         middle = (stands.min(axis=0) + stands.max(axis=0)) / 2.0
         plane = pv.Disc(center=(*middle, height), inner=0.0, outer=radius, normal=(0, 0, 1), r_res=48, c_res=96)
         away = np.linalg.norm(plane.points[:, :2] - middle, axis=1) / radius
-        left = np.clip((1.0 - away) / (1.0 - FADES), 0.0, 1.0)[:, None] ** 2
+        # It fades from 0.45 of its radius on.
+        left = np.clip((1.0 - away) / 0.55, 0.0, 1.0)[:, None] ** 2
         colours = np.rint(left * palette.GROUND + (1.0 - left) * palette.PAPER)
         self._add("earth", plane, colours, forward=-IN_FRONT_OF_ALL)
         shadow = self._surface.copy()
@@ -228,7 +200,7 @@ class SolidScene(Scene):
         points = np.asarray(ends, dtype=float).reshape(-1, 3)
         self.clear(layer)
         if len(points):
-            mesh = pv.PolyData(points, lines=_line_cells(np.arange(len(points)).reshape(-1, 2)))
+            mesh = pv.PolyData(points, lines=pv.CellArray.from_regular_cells(np.arange(len(points)).reshape(-1, 2)))
             self._add(layer, mesh, colour, width=width, forward=forward)
 
     def polygons(
@@ -313,7 +285,8 @@ class SolidScene(Scene):
             edges = mechanics.moved_vertices(self.assembly, swing.increment.pose)[self.edges]
             moving = (swing.parts >= 0)[self.assembly.block_of_vertex[self.edges[:, 0]]]
             self.lines("before", edges[moving], palette.GHOST, self.usual_height / 900.0)
-        self.arrows("motion", tails, tips + (LONGER - 1.0) * (tips - tails), palette.SETTLEMENT)
+        # Longer than the way that is drawn, to be seen on the blocks.
+        self.arrows("motion", tails, tips + 0.6 * (tips - tails), palette.SETTLEMENT)
         if swing.n_parts > MOST_PARTS:
             # Of many blocks those behind others would seem to be the ways of what is in front of them.
             self._overlays["motion top"] = replace(self._overlays["motion top"], within=self.assembly.block_size)
@@ -373,7 +346,8 @@ class SolidScene(Scene):
             picture = picture.reduce(self._over)
         shapes = [shape for arrows in self._overlays.values() for shape in self._shapes(arrows)]
         upright = Affine2D().scale(1.0, -1.0).translate(0.0, picture.size[1])
-        return painted(_fading(picture, round(EDGE * min(picture.size))), shapes, upright)
+        # Free blocks end before the strip that fades.
+        return painted(_fading(picture, round(0.028 * min(picture.size))), shapes, upright)
 
     def _shapes(self, arrows: _Arrows) -> Iterator[tuple[tuple[int, int, int], float, float, Path]]:
         """Yield arrows in the last picture [pixels] with a white rim, as :func:`painted` takes them."""
@@ -527,12 +501,9 @@ def _feet(assembly: solver.Assembly) -> np.ndarray:
     np.minimum.at(lowest, owner, heights)
     ground = ~assembly.free & (lowest < lowest[assembly.free].min(initial=np.inf))
     upwards = shapes.faces(shapes.vertices).normals[shapes.face_of_corner, 2]
-    down, up = (np.unique(shapes.corners[way * upwards > LEVEL]) for way in (-1.0, 1.0))
+    # Faces that are rather level than upright.
+    down, up = (np.unique(shapes.corners[way * upwards > 0.5]) for way in (-1.0, 1.0))
     return np.setdiff1d(down[ground[owner[down]]], up)
-
-
-def _line_cells(ends: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.full(len(ends), 2), ends]).ravel()
 
 
 def _plotter(size: tuple[int, int]) -> pv.Plotter:
@@ -541,8 +512,9 @@ def _plotter(size: tuple[int, int]) -> pv.Plotter:
     with pv.vtk_verbosity("error"):
         plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
         plotter.background_color = "white"
-        plotter.enable_anti_aliasing("msaa", multi_samples=SAMPLES)
-        plotter.add_light(pv.Light(position=LAMP, light_type="camera light", intensity=1.0))
+        plotter.enable_anti_aliasing("msaa", multi_samples=4)
+        # Above the left shoulder: to the right, up and to the eye.
+        plotter.add_light(pv.Light(position=(-0.45, 0.85, 1.2), light_type="camera light", intensity=1.0))
     return plotter
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,24 +21,14 @@ from .surface import left_blocks
 AROUND = (-60.0, -30.0, -120.0, -150.0, 30.0, 60.0, 120.0, 150.0)
 ABOVE = 24.0
 
-#: Degrees above the level for what is lower than this part of its smaller side in plan: slabs and floors.
-LOW, ABOVE_LOW = 0.35, 38.0
-
-#: What it is worth to have what moves in front, beside seeing all of its motion; and to look from the front, along y.
-IN_FRONT, FROM_THE_FRONT = 0.35, 0.04
+#: What it is worth to have what moves in front, beside seeing all of its motion.
+IN_FRONT = 0.35
 
 #: Directions in which a motion is seen as well as in the best one, within this part, are equal.
 ALIKE = 0.02
 
-#: Degrees above the level for what a level plane cuts; other planes are seen from where at least this cosine of the
-#: angle to their normal is left.
-ABOVE_CUT, ACROSS = 50.0, 0.6
-
-#: Structures have an intrados where so large a part of their plan hangs over air.
-OVER_AIR = 0.4
-
-#: Supports that hide more of a structure than this, seen from below, are drawn by their edges.
-HIDING = 0.12
+#: Planes that cut are seen from where at least this cosine of the angle to their normal is left; level ones from above.
+ACROSS = 0.6
 
 
 @dataclass(frozen=True)
@@ -73,7 +64,7 @@ def views_of(
     """
     sight = sight or Sight(both=cut is None and has_intrados(response.assembly, joints))
     level = cut is not None and abs(cut.normal[2]) > ACROSS
-    above = ABOVE_CUT if level else _above(response.assembly)
+    above = 50.0 if level else _above(response.assembly)
     views = views_from(sight, above)
     if sight.azimuth is None and cut is not None and not level:
         facing = [abs(float(view.axes[2] @ cut.normal)) for view in views]
@@ -100,7 +91,7 @@ def has_intrados(assembly: solver.Assembly, joints: InitialJoints) -> bool:
     lower = np.where(plan > 0.0, joints.block_b, joints.block_a)
     down -= float(np.abs(plan)[free[upper]].sum())
     up -= float(np.abs(plan)[free[lower]].sum())
-    return down > OVER_AIR * up > 0.0
+    return down > 0.4 * up > 0.0
 
 
 def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
@@ -112,7 +103,7 @@ def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
     whole = shapely.MultiPoint(flat[assembly.free[owner]]).convex_hull
     for block in np.flatnonzero(~assembly.free).tolist():
         shadow = shapely.MultiPoint(flat[owner == block]).convex_hull
-        hides[block] = shadow.intersection(whole).area > HIDING * whole.area
+        hides[block] = shadow.intersection(whole).area > 0.12 * whole.area
     return hides
 
 
@@ -180,7 +171,14 @@ def _size(assembly: solver.Assembly) -> np.ndarray:
 def _above(assembly: solver.Assembly) -> float:
     """Degrees above the level from which a structure is seen by default."""
     size = _size(assembly)
-    return ABOVE_LOW if size[2] < LOW * min(size[:2]) else ABOVE
+    # Slabs and floors from higher.
+    return 38.0 if size[2] < 0.35 * min(size[:2]) else ABOVE
+
+
+def first_alike(views: Sequence[View], worth: Callable[[View], float]) -> View:
+    """Choose the first of views that are worth as much as the best one, but for :data:`ALIKE`."""
+    worths = [worth(view) for view in views]
+    return next(view for view, value in zip(views, worths, strict=True) if value >= max(worths) - ALIKE)
 
 
 def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View] | None = None) -> View:
@@ -195,7 +193,8 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
     if path:
         # What supports do before counts like the mechanism.
         moved = path[-1].pose.positions - assembly.centroids
-        motion = _scaled(motion, weights) + _scaled(moved, volumes * np.linalg.norm(moved, axis=1))
+        ways = volumes * np.linalg.norm(moved, axis=1)
+        motion = motion / (weights.sum() or 1.0) + moved / (ways.sum() or 1.0)
         weights = volumes * np.linalg.norm(motion, axis=1)
     views = views or [View(around, _above(assembly)) for around in AROUND]
     if not weights.any():
@@ -204,18 +203,15 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
     centre = weights @ assembly.centroids / weights.sum()
     states = path or response.increments
     lines = SightLines(assembly, states[-1 if path else 0].pose if states else solver.Pose.initial(assembly), weights)
-    seen = [
-        float((volumes * lines.seen(view.axes, n)) @ np.linalg.norm(motion @ view.axes[:2].T, axis=1) / weights.sum())
-        + IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(_size(assembly).max())
-        - FROM_THE_FRONT * float(view.axes[2, 1])
-        for view in views
-    ]
-    best = max(seen)
-    return next(view for view, value in zip(views, seen, strict=True) if value >= best - ALIKE)
 
+    def worth(view: View) -> float:
+        across = np.linalg.norm(motion @ view.axes[:2].T, axis=1)
+        seen = float((volumes * lines.seen(view.axes, n)) @ across / weights.sum())
+        front = IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(_size(assembly).max())
+        # To look from the front, along y, is worth a little.
+        return seen + front - 0.04 * float(view.axes[2, 1])
 
-def _scaled(motion: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    return motion / weights.sum() if weights.any() else np.zeros_like(motion)
+    return first_alike(views, worth)
 
 
 def showing_faces(shapes: mechanics.Polyhedra, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

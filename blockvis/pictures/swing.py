@@ -8,19 +8,19 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import falls_from
-from blockvis.results.swinging import corner_speeds, swung_increment
+from blockvis.results.swinging import SWING, corner_speeds, swung_increment
 from solver import mechanics
 
 from . import palette
 from .frame import framed
 
 #: A fall of so many frames needs no others; how many a mechanism has that swings out, and how far it goes, in motions
-#: whose fastest corner goes ``REACH``: what moves in a film is to be seen, and so its hinges may part.
+#: whose fastest corner goes ``SWING``: what moves in a film is to be seen, and so its hinges may part.
 ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
-#: The fastest corner of a mechanism goes so far, in sizes of the picture; less where hinges would part by more than
-#: ``TEAR`` beyond what they do to first order: a hinge is closed, however far its sides turn.
-REACH, TEAR = 0.05, 0.002
+#: The fastest corner of a mechanism goes less far than ``SWING``, in sizes of the picture, where hinges would part by
+#: more than this beyond what they do to first order: a hinge is closed, however far its sides turn.
+TEAR = 0.002
 
 #: Up to this many parts of a mechanism are tinted one by one: each has a colour of its own.
 MOST_PARTS = len(palette.PARTS)
@@ -39,7 +39,7 @@ class Swing:
     parts: np.ndarray  #: (n_blocks,) int array: as ``solver.mechanics.rigid_parts`` gives them.
     moves: bool  #: Whether anything moves.
     motion: np.ndarray  #: (n_blocks, n_dof) array: from the increment's pose to the displaced one.
-    share: float  #: How much this is of the motion whose fastest corner goes ``REACH`` of the picture.
+    share: float  #: How much this is of the motion whose fastest corner goes ``SWING`` of the picture.
 
     @property
     def n_parts(self) -> int:
@@ -63,7 +63,7 @@ def swing_of(response: solver.Response) -> Swing:
         fastest = _exceeded_by(0.01, speeds, assembly.shapes.volumes) or fastest
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
     size = float(framed(assembly, [last.pose]).size.max())
-    motion = motion * (REACH * size / fastest if fastest > 0 else 0.0)
+    motion = motion * (SWING * size / fastest if fastest > 0 else 0.0)
     share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(assembly, last, motion), 1e-300))))
     displaced = mechanics.swung(last.pose, share * motion)
     return Swing(last, begins, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, share * motion, share)

@@ -37,11 +37,8 @@ COLOURS = {
 WIDTHS, PROPS = {mechanics.SLACK: 2.5, mechanics.ELASTIC: 6.0, mechanics.YIELDING: 8.0, mechanics.BROKEN: 5.0}, 1.8
 WIDTHS[PRESSED] = WIDTHS[mechanics.ELASTIC]
 
-#: A slack line has a dash in so many pixels of a picture 1080 high; of a broken one this part is left at either end.
-DASH, STUB = 22.0, 0.42
-
-#: Width of what stands for the ground at an end that it holds, in pixels of a picture 1080 high.
-EARTH = 3.0
+#: A slack line has a dash in so many pixels of a picture 1080 high.
+DASH = 22.0
 
 #: What a tie carries at rest is, below this part of the largest force, how the joints give and no number to tell.
 SMALLEST_TOLD = 1e-4
@@ -76,9 +73,8 @@ class DrawnTies:
 
     def survey(self, increment: solver.Increment) -> None:
         """Take note of what ties do at an increment, for the legend."""
-        if self._ties:
-            kinds = [tie.kind for tie in self._ties]
-            self.seen |= set(zip(self._states(increment).tolist(), kinds, strict=True))
+        kinds = [tie.kind for tie in self._ties]
+        self.seen |= set(zip(self._states(increment).tolist(), kinds, strict=True))
 
     def ends(self, poses: Sequence[solver.Pose]) -> np.ndarray:
         """(n, d) array [m]: where the ends are at poses."""
@@ -100,7 +96,7 @@ class DrawnTies:
         states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, shown)
         there = self._grounded & (states != mechanics.ABSENT)[:, None]
         earth = earth_lines(ends[there], ends[:, ::-1][there], dash)
-        found = [Strands("tie ground", earth, np.zeros((0, self._assembly.dimension)), palette.INK, EARTH)]
+        found = [Strands("tie ground", earth, np.zeros((0, self._assembly.dimension)), palette.INK, 3.0)]
         for state in DRAWN:
             for wide in (False, True):
                 here = ends[(states == state) & (self._props == wide)]
@@ -241,6 +237,6 @@ def dashed(ends: np.ndarray, length: float) -> np.ndarray:
 
 def _stubs(ends: np.ndarray) -> np.ndarray:
     """(2 n, 2, d) array [m]: what is left of broken lines (n, 2, d)."""
-    along = STUB * (ends[:, 1] - ends[:, 0])
+    along = 0.42 * (ends[:, 1] - ends[:, 0])
     first = np.stack([ends[:, 0], ends[:, 0] + along], axis=1)
     return np.concatenate([first, np.stack([ends[:, 1] - along, ends[:, 1]], axis=1)])

@@ -12,14 +12,8 @@ from solver import mechanics
 
 from . import palette
 
-#: How much of a photograph is paper: around the blocks, so that they stand out, and on them.
-PALE, PALE_ON_BLOCKS = 0.7, 0.15
-
 #: How much of their colour covers what blocks carry of it.
 COVER = 0.3
-
-#: Blocks that move by less are where they were [pixels].
-STILL = 0.5
 
 
 @dataclass(frozen=True)
@@ -60,7 +54,8 @@ class CarriedPhotograph:
         self._assembly, self._pixel = assembly, pixel
         seen = Image.fromarray(underlay.seen(low, pixel, size))
         paper = Image.new("RGB", size, palette.PAPER)
-        self._around, self._own = (Image.blend(seen, paper, pale) for pale in (PALE, PALE_ON_BLOCKS))
+        # Paler around the blocks, so that they stand out.
+        self._around, self._own = (Image.blend(seen, paper, pale) for pale in (0.7, 0.15))
         self._turn = np.diag([pixel, -pixel])
         self._corner = np.array([low[0], low[1] + pixel * size[1]])
 
@@ -70,7 +65,7 @@ class CarriedPhotograph:
         moved = mechanics.moved_vertices(assembly, pose)
         far = np.linalg.norm(moved - assembly.vertices, axis=1)
         rings = np.split((moved - self._corner) @ np.linalg.inv(self._turn), assembly.offsets[1:-1])
-        moves = np.maximum.reduceat(far, assembly.offsets[:-1]) > STILL * self._pixel
+        moves = np.maximum.reduceat(far, assembly.offsets[:-1]) > 0.5 * self._pixel
         standing = Image.new("L", picture.size)
         draw = ImageDraw.Draw(standing)
         for block in np.flatnonzero(~moves & ~gone):
@@ -87,9 +82,7 @@ class CarriedPhotograph:
         if (high <= low).any():
             return
         width, height = (high - low).tolist()
-        angle = float(np.ravel(pose.rotations[block])[0])
-        c, s = np.cos(angle), np.sin(angle)
-        back = np.linalg.inv(self._turn) @ np.array([[c, s], [-s, c]])
+        back = np.linalg.inv(self._turn) @ mechanics.rotation_matrices(pose.rotations[[block]])[0].T
         start = self._assembly.centroids[block] - self._corner
         shift = self._turn @ low + self._corner - pose.positions[block]
         place = np.column_stack([back @ self._turn, back @ shift + np.linalg.inv(self._turn) @ start])

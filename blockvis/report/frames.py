@@ -24,17 +24,7 @@ from blockvis.results.joints import carried_faces, joint_states
 from blockvis.text import force_text, rounded_length
 from solver import mechanics
 
-from .packing import (
-    FINENESS,
-    FORCE_FINENESS,
-    TOLD_FINENESS,
-    counted_steps,
-    deflated,
-    rounded,
-)
-
-#: How far down blocks go that are taken away, in extents of the structure.
-AWAY = 4.0
+from .packing import FINENESS, FORCE_FINENESS, TOLD_FINENESS, counted_steps, deflated, rounded
 
 
 def model_of_frames(
@@ -42,21 +32,20 @@ def model_of_frames(
 ) -> dict[str, Any]:
     """Pack what moves, frame after frame, and the scales of all; points ``held`` (n, d) [m] are in the page, too."""
     assembly = response.assembly
-    frame, largest, widest = _surveyed(assembly, joints, shown)
+    frame, largest, widest, farthest = _surveyed(assembly, joints, shown)
     live = LiveLoads(response, shown, float(frame.size.max()))
     frame = frame.holding(np.concatenate([live.tails, held]))
     # Coordinates far from the origin (UTM) would waste the digits.
     origin, extent = np.round(frame.low, 3), float(frame.size.max())
     unit = FINENESS * extent
-    tables = FrameTables(assembly, joints, shown, origin, unit, largest)
-    sizes = np.concatenate(tables.sizes)
+    packed, sizes = _tables(assembly, joints, shown, origin, unit, largest)
     shown_force = rounded_length(largest)
     return {
         "unit": unit,
         "origin": origin.tolist(),
         "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
         "widest_crack": widest,
-        "largest_displacement": tables.largest_displacement,
+        "largest_displacement": farthest,
         "arrows": _arrows(response, frame, origin),
         "has_forces": bool(len(sizes)),
         "live_words": live.words if live.largest > 0.0 else "",
@@ -67,10 +56,10 @@ def model_of_frames(
         "told_forces": [FINENESS * largest, TOLD_FINENESS],
         "force_scale": [shown_force, force_text(shown_force)],
         "packed": {
-            "vertices": deflated(rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
-            "centroids": deflated(rounded(assembly.centroids - origin, unit), assembly.n_blocks),
-            "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1), len(joints)),
-            **tables.packed(),
+            "vertices": deflated(rounded(assembly.vertices - origin, unit)),
+            "centroids": deflated(rounded(assembly.centroids - origin, unit)),
+            "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1)),
+            **packed,
             **_packed_live(live, shown, origin, unit),
         },
     }
@@ -78,12 +67,12 @@ def model_of_frames(
 
 def _surveyed(
     assembly: solver.Assembly, joints: InitialJoints, shown: list[solver.Increment]
-) -> tuple[Frame, float, float]:
-    """Frame of all poses, the largest resultant of a joint in equilibrium [N] or 1, and the widest crack [m]."""
-    largest = widest = 0.0
+) -> tuple[Frame, float, float, float]:
+    """Frame of all poses; the largest resultant of a joint in equilibrium [N] or 1, the widest crack and way [m]."""
+    largest = widest = farthest = 0.0
 
     def poses() -> Iterator[solver.Pose]:
-        nonlocal largest, widest
+        nonlocal largest, widest, farthest
         yield solver.Pose.initial(assembly)
         for increment in shown:
             yield increment.pose
@@ -92,9 +81,11 @@ def _surveyed(
                 largest = max(largest, float(sizes.max(initial=0.0)))
                 gaps = carried_faces(assembly, joints, increment.pose, increment.fallen).gaps
                 widest = max(widest, float(gaps.max(initial=0.0)))
+                moved = increment.pose.positions[assembly.free] - assembly.centroids[assembly.free]
+                farthest = max(farthest, float(np.linalg.norm(moved, axis=1).max(initial=0.0)))
 
     frame = framed(assembly, poses()) if assembly.dimension == 2 else framed(assembly, poses(), 0.0, 0.25)
-    return frame, largest or 1.0, widest
+    return frame, largest or 1.0, widest, farthest
 
 
 def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
@@ -103,9 +94,9 @@ def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndar
     first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
     tails, tips = (rounded(np.concatenate(ends) - origin, unit) for ends in zip(*found, strict=True))
     return {
-        "live_first": deflated(first, len(first)),
-        "live_tail": deflated(tails, first[-1]),
-        "live_tip": deflated(tips, first[-1]),
+        "live_first": deflated(first),
+        "live_tail": deflated(tails),
+        "live_tip": deflated(tips),
     }
 
 
@@ -123,74 +114,62 @@ def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list
     ]
 
 
-class FrameTables:
-    """What changes from frame to frame, as integers: motion, forces of the joints, resultants of blocks, and marks.
+def _tables(
+    assembly: solver.Assembly,
+    joints: InitialJoints,
+    shown: list[solver.Increment],
+    origin: np.ndarray,
+    unit: float,
+    largest: float,
+) -> tuple[dict[str, Any], np.ndarray]:
+    """Pack what changes from frame to frame, as integers; gives the sizes of the resultants [N], too.
 
-    Marks are hinges (1), sliding joints (2) and points that crush (3). A hinge has the ends of its line, in the plane
-    its place twice, as what crushes has; a sliding joint has its ends in the plane, and in space its number. Each
-    resultant names its two blocks, for which it is drawn; what is told is the normal and the shear force of each joint,
-    of which two blocks may have several. A part of the largest resultant [N] is the unit of force.
+    That is motion, forces of the joints, resultants of blocks, and marks: hinges (1), sliding joints (2) and points
+    that crush (3). A hinge has the ends of its line, in the plane its place twice, as what crushes has; a sliding joint
+    has its ends in the plane, and in space its number. Each resultant names its two blocks, for which it is drawn; what
+    is told is the normal and the shear force of each joint, of which two blocks may have several. A part of the largest
+    resultant [N] is the unit of force.
     """
+    # The place of a force need not be finer than a pixel; more digits would only fill the file.
+    coarse = round(FORCE_FINENESS / FINENESS / 4.0)
+    d, frames, every = assembly.dimension, list[dict[str, np.ndarray]](), list[np.ndarray]()
+    for increment in shown:
+        moved = increment.pose.displacements(assembly)
+        # What was taken away goes out of the picture.
+        moved[increment.removed, d - 1] -= 4.0 * unit / FINENESS
+        states, told = joint_states(assembly, joints, increment), slice(len(joints))
+        carried = np.stack([states.normal_force[told], states.shear_force[told]], axis=1)
+        points, forces, pairs = resultants(increment)
+        size = np.linalg.norm(forces, axis=1) * (increment.status != solver.Status.FALLING)
+        kept = size > SMALLEST_RESULTANT * largest
+        every.append(size[kept])
+        places, marks = _marks(assembly, joints, increment)
+        frames.append(
+            {
+                "travel": rounded(moved[:, :d], unit),
+                "turn": rounded(moved[:, d:], FINENESS),
+                "joint_forces": counted_steps(carried, FINENESS * largest),
+                "force_place": rounded(points[kept] - origin, unit * coarse) * coarse,
+                "force_vector": rounded(forces[kept], FORCE_FINENESS * largest),
+                "force_blocks": pairs[kept],
+                "mark_place": rounded(places - origin, unit).reshape(-1, 2 * d),
+                "mark_kind": marks[:, 0],
+                "mark_joint": marks[:, 1],
+            }
+        )
 
-    def __init__(
-        self,
-        assembly: solver.Assembly,
-        joints: InitialJoints,
-        shown: list[solver.Increment],
-        origin: np.ndarray,
-        unit: float,
-        largest: float,
-    ) -> None:
-        # The place of a force need not be finer than a pixel; more digits would only fill the file.
-        coarse = round(FORCE_FINENESS / FINENESS / 4.0)
-        d = assembly.dimension
-        self._n, self._in_space = len(shown), d == 3
-        self._travel, self._turn, self._told = [], [], []
-        self._places, self._vectors, self._pairs = (_nothing(n) for n in (d, d, 2))
-        self.sizes = [np.zeros(0)]
-        self._mark_places, self._marks = _nothing(2 * d), _nothing(2)
-        self.largest_displacement = 0.0
-        for increment in shown:
-            moved = increment.pose.displacements(assembly)
-            falling = increment.status == solver.Status.FALLING
-            if not falling:
-                far = float(np.linalg.norm(moved[assembly.free, :d], axis=1).max(initial=0.0))
-                self.largest_displacement = max(self.largest_displacement, far)
-            # What was taken away goes out of the picture.
-            moved[increment.removed, d - 1] -= AWAY * unit / FINENESS
-            self._travel.append(rounded(moved[:, :d], unit))
-            self._turn.append(rounded(moved[:, d:], FINENESS))
-            states, told = joint_states(assembly, joints, increment), slice(len(joints))
-            carried = np.stack([states.normal_force[told], states.shear_force[told]], axis=1)
-            self._told.append(counted_steps(carried, FINENESS * largest))
-            points, forces, pairs = resultants(increment)
-            size = np.linalg.norm(forces, axis=1) * (not falling)
-            kept = size > SMALLEST_RESULTANT * largest
-            self._places.append(rounded(points[kept] - origin, unit * coarse) * coarse)
-            self._vectors.append(rounded(forces[kept], FORCE_FINENESS * largest))
-            self.sizes.append(size[kept])
-            self._pairs.append(pairs[kept].astype(np.int32))
-            places, marks = _marks(assembly, joints, increment)
-            self._mark_places.append(rounded(places - origin, unit).reshape(-1, 2 * d))
-            self._marks.append(marks)
-
-    def packed(self) -> dict[str, Any]:
-        """As the page unpacks them."""
-        forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self._marks))
-        marks = np.concatenate(self._marks)
-        return {
-            "travel": deflated(np.stack(self._travel), self._n),
-            "turn": deflated(np.stack(self._turn), self._n),
-            "joint_forces": deflated(np.stack(self._told), self._n),
-            "force_first": deflated(forces, len(forces)),
-            "force_place": deflated(np.concatenate(self._places), forces[-1]),
-            "force_vector": deflated(np.concatenate(self._vectors), forces[-1]),
-            "force_blocks": deflated(np.concatenate(self._pairs), forces[-1]),
-            "mark_first": deflated(found, len(found)),
-            "mark_place": deflated(np.concatenate(self._mark_places), found[-1]),
-            "mark_kind": deflated(marks[:, 0], found[-1]),
-            **({"mark_joint": deflated(marks[:, 1], found[-1])} if self._in_space else {}),
+    def listed(first: str, *names: str) -> dict[str, Any]:
+        counts = np.cumsum([0, *(len(frame[names[0]]) for frame in frames)])
+        return {first: deflated(counts)} | {
+            name: deflated(np.concatenate([frame[name] for frame in frames])) for name in names
         }
+
+    packed = {
+        **{name: deflated(np.stack([of[name] for of in frames])) for name in ("travel", "turn", "joint_forces")},
+        **listed("force_first", "force_place", "force_vector", "force_blocks"),
+        **listed("mark_first", "mark_place", "mark_kind", *["mark_joint"] * (d == 3)),
+    }
+    return packed, np.concatenate(every)
 
 
 def _marks(
@@ -210,7 +189,3 @@ def _marks(
     crushing = points[mechanism.crushing_points][:, None].repeat(2, axis=1)
     marks = [*[(1, -1)] * len(hinges), *[(2, number) for number in numbers], *[(3, -1)] * len(crushing)]
     return np.concatenate([hinges, sliding, crushing]), np.array(marks, dtype=np.int32).reshape(-1, 2)
-
-
-def _nothing(columns: int) -> list[np.ndarray]:
-    return [np.zeros((0, columns), dtype=np.int32)]

@@ -24,9 +24,6 @@ from solver import mechanics
 
 from .page import html_rows, report_html, summary_rows
 
-#: Inches of the curve of a response; it and the picture are shown at half their width.
-CURVE = (6.4, 3.6)
-
 #: Pixels of the width and largest height of the picture of an assembly.
 WIDE, HIGH = 560, 420
 
@@ -65,7 +62,8 @@ def response_html(response: solver.Response) -> str:
             picture = mechanism_picture(response, usual=FILM_SIZE)
             pictures.append(save_picture(picture, Path(folder) / "mechanism.png"))
         if response.path:
-            pictures.append(draw_curve(response, Path(folder) / "curve.png", size=CURVE))
+            pictures.append(draw_curve(response, Path(folder) / "curve.png", size=(6.4, 3.6)))
+        # At half their width.
         images = [_image(path.stem, Image.open(path).width // 2, path.read_bytes()) for path in pictures]
     return f"<div>{''.join(images)}{_table(summary_rows(response))}</div>"
 

@@ -7,6 +7,7 @@ import zlib
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 #: Lengths are stored in this fraction of the extent of the structure, rotations and directions in this unit; forces
 #: that are told are 0 below this fraction of the largest: equilibria are that exact.
@@ -19,13 +20,14 @@ FORCE_FINENESS = 1e-3
 TOLD_FINENESS = 2e-4
 
 
-def deflated(values: np.ndarray, rows: int) -> dict[str, Any]:
+def deflated(values: ArrayLike) -> dict[str, Any]:
     """Pack integers: differences along the first axis, split in planes of bytes, deflated, in base 64."""
-    table = np.asarray(values).astype("<i4").reshape(rows, -1) if rows else np.zeros((0, 1), dtype="<i4")
+    whole = np.asarray(values).astype("<i4")
+    table = whole.reshape(len(whole), -1 if len(whole) else 1)
     steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype="<i4"))
     planes = steps.reshape(-1, 1).view(np.uint8).T
     data = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
-    return {"rows": rows, "columns": table.shape[1], "data": data}
+    return {"rows": len(table), "columns": table.shape[1], "data": data}
 
 
 def rounded(values: np.ndarray, unit: float) -> np.ndarray:

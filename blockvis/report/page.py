@@ -42,12 +42,13 @@ from blockvis.pictures.captions import (
     value_label,
 )
 from blockvis.pictures.drawer import FEW_BLOCKS
+from blockvis.pictures.film import PATH_SECONDS
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.render import check_increments
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
 from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of, phases_of
-from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
+from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, last_cracks
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
 from blockvis.results.ties import tie_courses, tie_force_curves, tie_texts
@@ -70,17 +71,11 @@ ERROR_UNKNOWN = "<!-- error not known -->"
 #: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
 MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
 
-#: Seconds the path takes at even settlement, each frame of a fall without time, and the pause before a fall.
-PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
-
-#: Length of the longest arrow of the load of a fill, as a part of the larger side of the picture.
-FILL_ARROW = 0.1
+#: Seconds of each frame of a fall without time, and of the pause before a fall.
+FALL_SECONDS, PAUSE = 0.06, 0.6
 
 #: How the picture of blocks in space is turned and moved.
 TURNING = "the mouse or Shift with the arrows turns the picture, the mouse with Shift moves it"
-
-#: Crack lines that the table of the page lists.
-LISTED_CRACKS = 8
 
 
 @dataclass(frozen=True)
@@ -173,6 +168,7 @@ def report_html(
     origin = about(response)
     model = _model(response, fall, band) | {"name": origin.name}
     data = json.dumps(model, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+    cracks = _table("Cracks at the last equilibrium", "crack-lines", crack_rows(last_cracks(response), 8))
     failed, in_space = response.stop is solver.Status.SOLVER_FAILED, response.assembly.dimension == 3
     return Template(_part("player.html")).substitute(
         title=html.escape(title or " · ".join(filter(None, (origin.name, headline_of(response))))),
@@ -184,7 +180,7 @@ def report_html(
         script=_part("player.js").replace("  // SCENE\n", _part("space.js" if in_space else "plane.js")),
         turning=TURNING if in_space else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
-        cracks=_cracks(response) + _table("Ties and props", "ties", tie_rows(response)),
+        cracks=cracks + _table("Ties and props", "ties", tie_rows(response)),
         certificate=html_rows(certificate_rows(response)),
         error=_error(error) + html_rows(range_rows(band)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
@@ -209,15 +205,6 @@ def _notes(response: solver.Response) -> str:
     """List the notes of the run."""
     items = "".join(f"<li>{html.escape(note)}</li>" for note in dict.fromkeys(response.notes))
     return f'<h2>Notes</h2><ul id="notes">{items}</ul>' if items else ""
-
-
-def _cracks(response: solver.Response) -> str:
-    """List the crack lines of the last equilibrium."""
-    if not response.path:
-        return ""
-    last = response.path[-1]
-    cracks = cracks_of(response.assembly, last.pose, last.fallen)
-    return _table("Cracks at the last equilibrium", "crack-lines", crack_rows(cracks, LISTED_CRACKS))
 
 
 def _table(title: str, name: str, rows: Sequence[Sequence[str]]) -> str:
@@ -313,12 +300,12 @@ def _model_in_plane(response: solver.Response, shown: list[solver.Increment], gr
     origin, unit = np.array(model["origin"]), model["unit"]
     extent = float(np.subtract(model["bounds"][2:], model["bounds"][:2]).max())
     own = {
-        "offsets": deflated(assembly.offsets, len(assembly.offsets)),
-        "joint_ends": deflated(rounded(joints.ends - origin, unit), len(joints)),
+        "offsets": deflated(assembly.offsets),
+        "joint_ends": deflated(rounded(joints.ends - origin, unit)),
     }
     return model | {
         "ground": None if ground is None else float(ground - origin[1]),
-        "fill": _fill(response, shown, origin, FILL_ARROW * extent),
+        "fill": _fill(response, shown, origin, 0.1 * extent),
         "packed": model["packed"] | own,
     }
 
@@ -384,11 +371,8 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
         caption = caption.replace("   ·   ", "  ·  ")
         told = {"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase}
         fell_at = increment.state.fell_at
-        lost = {
-            "gone": np.flatnonzero(~np.isnan(fell_at)).tolist(),
-            "lost": np.flatnonzero(np.isfinite(fell_at)).tolist(),
-        }
-        frames.append(told | lost)
+        gone, lost = (np.flatnonzero(of).tolist() for of in (~np.isnan(fell_at), np.isfinite(fell_at)))
+        frames.append({**told, "gone": gone, "lost": lost})
     return frames
 
 

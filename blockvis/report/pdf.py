@@ -25,7 +25,7 @@ from blockvis.pictures.marks import evenly
 from blockvis.pictures.render import check_increments, draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
 from blockvis.results.about import about, phases_of
-from blockvis.results.cracks import Crack, cracks_of
+from blockvis.results.cracks import Crack, last_cracks
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text, width_text
@@ -36,9 +36,8 @@ from .page import certificate_rows, headline_of, range_rows, summary_rows, tie_r
 #: Width of the text, margin and height of a line [mm]; size of the text [points].
 WIDTH, MARGIN, LINE, TEXT = 174.0, 18.0, 5.2, 9.5
 
-#: Largest height of a picture, in which its smallest letters have 7 points, height of its heading, and width of the
-#: curve [mm].
-HIGHEST, HEADING, CURVE = 175.0, 10.0, 150.0
+#: Largest height of a picture, in which its smallest letters have 7 points [mm].
+HIGHEST = 175.0
 
 #: Cracks and states that the tables list.
 MOST_CRACKS, MOST_STATES = 20, 16
@@ -82,9 +81,9 @@ def write_pdf(
             last = response.path[-1]
             state = "Last equilibrium" if response.parameter.is_path else "Last state"
             paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay, **eye), state)
-            paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), "Curve", CURVE)
+            paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), "Curve", 150.0)
             paper.tabulate(*_states(response))
-            cracks = cracks_of(response.assembly, last.pose, last.fallen)
+            cracks = last_cracks(response)
             if cracks:
                 paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png", **eye), "Cracks")
                 paper.tabulate("Cracks at the last equilibrium", *_crack_table(cracks))
@@ -203,7 +202,8 @@ class _Paper(FPDF):
             proportion = image.height / image.width
         width = min(width, HIGHEST / proportion)
         if title:
-            self.heading(title, 12.0, HEADING + proportion * width)
+            # Ten of it for the heading.
+            self.heading(title, 12.0, 10.0 + proportion * width)
         self.image(path, x=MARGIN + (WIDTH - width) / 2.0, w=width)
         self.ln(2.0)
 

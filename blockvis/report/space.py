@@ -35,12 +35,12 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
         "fill": _fill(bodies, np.array(model["origin"])) if response.loads.fills else None,
         "packed": model["packed"]
         | {
-            "offsets": deflated(shapes.offsets, len(shapes.offsets)),
-            "triangles": deflated(triangles, len(triangles)),
-            "edges": deflated(edges, len(edges)),
-            "ring_first": deflated(rings.offsets, len(rings.offsets)),
-            "ring_points": deflated(corners, len(rings.points)),
-            "ring_normals": deflated(rounded(joints.normals, FINENESS), len(joints)),
+            "offsets": deflated(shapes.offsets),
+            "triangles": deflated(triangles),
+            "edges": deflated(edges),
+            "ring_first": deflated(rings.offsets),
+            "ring_points": deflated(corners),
+            "ring_normals": deflated(rounded(joints.normals, FINENESS)),
         },
     }
 

@@ -22,12 +22,8 @@ from .record import Record, read_json, read_record, versions
 #: A mechanism that takes less than this share of the weight with it is the loss of a few blocks: the structure stands.
 LOCAL = 0.05
 
-#: A reaction below this part of the weight, of moments at the extent of what it acts on, is none: programs reach a
-#: tenth of it.
-NOTHING = 1e-6
-
 #: Equilibria are exact to this: openings and slips in block sizes, forces and multipliers in the largest, motions in
-#: those of the fastest block.
+#: those of the fastest block, reactions in the weight, of moments at the extent of what it acts on.
 EXACT = 1e-6
 
 
@@ -99,7 +95,7 @@ def rounding_of(response: solver.Response, moment: bool) -> float:
     """Give the rounding of a reaction [N], or of a moment [N·m]: weight acts as far from supports as its extent."""
     assembly = response.assembly
     extent = float(np.ptp(assembly.vertices[assembly.free[assembly.block_of_vertex]], axis=0).max())
-    return NOTHING * response.total_weight * (extent if moment else 1.0)
+    return EXACT * response.total_weight * (extent if moment else 1.0)
 
 
 class Measured(Protocol):

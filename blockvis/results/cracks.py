@@ -59,7 +59,7 @@ MOST_MAIN = 6
 ALIKE = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Crack:
     """A course of joints of the layout that have parted or slid one after another, at least one of them open.
 
@@ -130,6 +130,11 @@ def cracks_of(assembly: solver.Assembly, pose: solver.Pose, fallen: np.ndarray |
         places = Places(assembly) if open_ones else None
         found = [_crack(assembly, joints, moved, course, places) for course in open_ones]
     return sorted((crack for crack in found if crack.width > least), key=lambda crack: -crack.width)
+
+
+def last_cracks(response: solver.Response) -> list[Crack]:
+    """Trace the cracks of the last equilibrium of a response, the widest first; none where there is none."""
+    return [crack for end in response.path[-1:] for crack in cracks_of(response.assembly, end.pose, end.fallen)]
 
 
 def slid_joints(assembly: solver.Assembly, moved: np.ndarray) -> np.ndarray:

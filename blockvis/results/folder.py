@@ -20,7 +20,7 @@ from blockvis.text import resume_command
 from solver import mechanics
 
 from .about import phases_of
-from .cracks import MOST_LISTED, cracks_of
+from .cracks import MOST_LISTED, last_cracks
 from .fall_files import remove_fall
 from .given import GIVEN, write_given
 from .increments import StoredIncrements, packed_increment
@@ -226,11 +226,7 @@ class ResultsFolder:
         write_atomic(self.path / "joints.csv", self._movements.table(phases_of(response)))
         for name, text in (tables or {}).items():
             write_atomic(self.path / name, text)
-        cracks = []
-        if response.path:
-            end = response.path[-1]
-            cracks = cracks_of(self.assembly, end.pose, end.fallen)
-        listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
+        listed = {"cracks": [crack.values() for crack in last_cracks(response)[:MOST_LISTED]]}
         if self.ties:
             courses = self._courses.courses if response.parameter.is_path else tie_courses(response)
             listed["ties"] = [asdict(course) for course in courses]

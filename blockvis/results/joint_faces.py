@@ -49,16 +49,12 @@ class Rings:
 
     def areas(self) -> np.ndarray:
         """(n,) array [m²]."""
-        if not len(self):
-            return np.zeros(0)
         arms = self.points - self.points[self.offsets[:-1]][self.ring]
         cross = np.add.reduceat(np.cross(arms, arms[self.following]), self.offsets[:-1])
         return np.asarray(np.linalg.norm(cross, axis=1) / 2.0)
 
     def middles(self) -> np.ndarray:
         """(n, d) array [m]: mean of the corners of each."""
-        if not len(self):
-            return np.zeros((0, self.points.shape[1]))
         return np.add.reduceat(self.points, self.offsets[:-1]) / np.diff(self.offsets)[:, None]
 
     def at(self, points: np.ndarray) -> Rings:
@@ -74,7 +70,7 @@ class Rings:
 
     def largest(self, values: np.ndarray) -> np.ndarray:
         """(n,) array: largest of the values, (n_points,), at the corners of each polygon."""
-        return np.maximum.reduceat(values, self.offsets[:-1]) if len(self) else np.zeros(0)
+        return np.asarray(np.maximum.reduceat(values, self.offsets[:-1]))
 
 
 @dataclass(frozen=True)

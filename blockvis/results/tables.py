@@ -42,6 +42,8 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     path, collapse, phase = response.path, response.collapse, collapse_phase(response)
     in_phase = phase if phase is not None else path[-1].phase if path else 0
     worst = mechanics.worst_of(i.certificate for i in path)
+    # Hinges and sliding joints are those of the picture of the mechanism.
+    mechanism, loss = collapse_mechanism(response), loss_of(response)
     # States that stand by themselves stand after the last of the settlements, or as drawn.
     before = None if response.parameter.is_path else next(reversed(response.settlements), None)
     last = path[-1].parameter if path and response.parameter.is_path else before.limit if before else 0.0
@@ -58,8 +60,11 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_lost": collapse.lost if collapse else None,
         "collapse_reaction": collapse.reaction if collapse else None,
         "mechanism": mechanism_text(response) if collapse else None,
-        **_joint_counts(response),
-        **_loss(response),
+        "hinges": None if mechanism is None else len(mechanism.hinges),
+        "sliding_joints": None if mechanism is None else len(mechanism.sliding),
+        "loss": None if loss is None else "local" if loss.local else "structure",
+        "falling_weight": None if loss is None else loss.weight,
+        "falling_share": None if loss is None else loss.share,
         "losses": [{**asdict(loss), "phase": loss.phase + 1} for loss in response.losses],
         "removed": removals(response),
         "analysis": response.analysis,
@@ -152,22 +157,6 @@ def changes_told(response: solver.Response) -> list[tuple[str, str]]:
     """Say before which settlement what changes, of those that the path comes to."""
     told = ((phase, ", ".join(change_words(response, phase))) for phase in range(_last_phase(response) + 1))
     return [(f"before settlement {phase + 1}", words) for phase, words in told if words]
-
-
-def _joint_counts(response: solver.Response) -> dict[str, int | None]:
-    """How many hinges and sliding joints the collapse mechanism has, as the picture of it shows them."""
-    mechanism = collapse_mechanism(response)
-    if mechanism is None:
-        return {"hinges": None, "sliding_joints": None}
-    return {"hinges": len(mechanism.hinges), "sliding_joints": len(mechanism.sliding)}
-
-
-def _loss(response: solver.Response) -> dict[str, Any]:
-    """Weight that falls in the collapse, its share of the whole, and whether that is a local loss."""
-    loss = loss_of(response)
-    if loss is None:
-        return {"loss": None, "falling_weight": None, "falling_share": None}
-    return {"loss": "local" if loss.local else "structure", "falling_weight": loss.weight, "falling_share": loss.share}
 
 
 def own_columns(parameter: mechanics.Quantity) -> tuple[str, ...]:

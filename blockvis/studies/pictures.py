@@ -34,14 +34,8 @@ from .summary import MOST_MECHANISMS, classes_of, curve_name, ends_counted, is_s
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Classes of mechanisms that are drawn.
-DRAWN = 12
-
 #: Empty border of a tile, and how far beyond the blocks it shows supports, in sizes of the structure.
 MARGIN, SUPPORTS = 0.05, 0.25
-
-#: Panels of the scatter, for the parameters with the largest swings.
-PANELS = 3
 
 #: Colours and marks of the classes, the most frequent first; the marks distinguish them in grey as well.
 CLASSES = ("#145ca8", "#e24e1b", "#00796b", "#7e37b2", "#b08a00", "#7a4a2b")
@@ -180,12 +174,12 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     """Draw where every run collapses against the parameters with the largest swings, by mechanism."""
     factor, unit = _scale(study, table)
     numeric = {p.name for p in study.parameters if p.numeric}
-    names = [s.name for s in swings(study, table) if s.name in numeric][:PANELS] or ["run"]
+    names = [s.name for s in swings(study, table) if s.name in numeric][:3] or ["run"]
     classes = classes_of(table)
     shown = list(classes)[:MOST_MECHANISMS]
     width = 8.0 if len(names) == 1 else 2.0 + 3.6 * len(names)
     labels = [textwrap.fill(f"{k + 1}: {one} ({classes[one]})", round(13.5 * width)) for k, one in enumerate(shown)]
-    lines = sum(label.count("\n") + 1 for label in labels) + 2
+    lines = len("\n".join(labels).splitlines()) + 2
     figure = Figure(figsize=(width, 4.6 + 0.2 * lines), layout="constrained")
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     y = factor * outcome(table)
@@ -225,7 +219,7 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
     """Draw one run of each mechanism found, the most frequent first."""
     classes = classes_of(table)
     factor, unit = _scale(records.study, table)
-    shown = [one for one in classes if records.shape_file(one).is_file()][:DRAWN]
+    shown = [one for one in classes if records.shape_file(one).is_file()][:12]
     columns = min(3, max(1, len(shown)))
     rows = -(-len(shown) // columns) if shown else 1
     shapes = []

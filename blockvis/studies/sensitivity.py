@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -154,9 +155,7 @@ def _exchanged(study: Study, y: np.ndarray) -> dict[str, tuple[float, float]]:
     names = [*(p.name for p in study.parameters), IMPERFECTIONS][: study.design.factors]
     if len(groups) < 4:
         return {}
-    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
-    found = sobol.analyze(problem, groups.ravel(), calc_second_order=False, num_resamples=200, seed=study.seed)
-    return {name: (float(s), float(e)) for name, s, e in zip(names, found["S1"], found["S1_conf"], strict=True)}
+    return _indices(names, sobol.analyze, groups.ravel(), calc_second_order=False, seed=study.seed)
 
 
 def _of_sample(
@@ -166,10 +165,15 @@ def _of_sample(
 
     if not parameters:
         return {}
-    names = [p.name for p in parameters]
-    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
     # The number of harmonics must be small compared with the number of runs.
-    found = rbd_fast.analyze(problem, u, y, M=max(4, min(10, len(y) // 25)), num_resamples=200, seed=seed)
+    harmonics = max(4, min(10, len(y) // 25))
+    return _indices([p.name for p in parameters], rbd_fast.analyze, u, y, M=harmonics, seed=seed)
+
+
+def _indices(names: list[str], analyse: Callable[..., Any], *data: Any, **given: Any) -> dict[str, tuple[float, float]]:
+    """Have SALib estimate an index and half its interval for each of some factors between 0 and 1."""
+    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+    found = analyse(problem, *data, num_resamples=200, **given)
     return {name: (float(s), float(e)) for name, s, e in zip(names, found["S1"], found["S1_conf"], strict=True)}
 
 

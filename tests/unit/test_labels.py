@@ -104,7 +104,7 @@ def test_every_picture_of_a_failed_run_has_a_badge(words):
 
 def keys_of(response, **look):
     drawer = Drawer(response, Look(**look), SMALL, response.increments)
-    return {key.text: key.kind for key in Drawer.keys(drawer)}
+    return {key.text: key.kind for key in drawer.keys}
 
 
 def test_the_legend_lists_what_is_drawn_and_what_is_too_much():
