@@ -9,10 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Iterations of the interior methods; mean product of forces, in block weights, and distances at which they have
-#: converged: small beside the compliance, which decides forces that equilibrium leaves open.
-ITERATIONS, CONVERGED = 60, 1e-12
-
 
 def inner(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(n,) array: inner products of columns; row by row, as numpy's sum along the first axis is four times as slow."""
