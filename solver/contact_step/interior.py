@@ -156,8 +156,9 @@ class _Iterate:
         if p.live is not None:
             self.unit = self._solved(np.zeros_like(normal), np.zeros_like(self.shear), p.live)
         elif p.unit_reaction is not None:
-            by_reaction = -p.unit_reaction
-            self.unit = self._solved(by_reaction[:, 0], by_reaction[self.rough, 1:].T, np.zeros_like(p.load))
+            given = -p.unit_reaction
+            *unit, relative = self._solved(given[:, 0], given[self.rough, 1:].T, np.zeros_like(p.load))
+            self.unit = (*unit, relative - given)
 
     def _forces_by(self, normal: np.ndarray, shear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Give normal forces, and shear forces along and across slides, by distances likewise."""
@@ -170,10 +171,11 @@ class _Iterate:
     def _in_frames(self, shear: np.ndarray) -> np.ndarray:
         return np.einsum("ijn,jn->in", self.frames, shear)
 
-    def _solved(
-        self, normal: np.ndarray, shear: np.ndarray, unbalanced: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Solve for the change of normal and shear forces, and the movement, by distances and forces out of balance."""
+    def _solved(self, normal: np.ndarray, shear: np.ndarray, unbalanced: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Give the change of normal and shear forces by distances and forces out of balance, the movement, and its own.
+
+        Its own is that at the contact points, (n, d).
+        """
         p, shear = self.problem, self._in_frames(shear)
         of_normal, of_shear = self._forces_by(normal, shear)
         of_shear = np.einsum("ijn,in->jn", self.frames, of_shear)
@@ -181,7 +183,7 @@ class _Iterate:
         relative = p.rows.relative(motion)
         shear = shear - self._in_frames(relative[self.rough, 1:].T)
         of_normal, of_shear = self._forces_by(normal - relative[:, 0], shear)
-        return of_normal, np.einsum("ijn,in->jn", self.frames, of_shear), motion
+        return of_normal, np.einsum("ijn,in->jn", self.frames, of_shear), motion, relative
 
     def direction(self, limit_products: np.ndarray, products: np.ndarray) -> _Change:
         """Newton's direction with what the products, those of cones in the scaling, are to change by."""
@@ -189,19 +191,16 @@ class _Iterate:
         target = scaling.scaled(quotient(products, scaling.scaled_point))
         of_normal = -self.normal_error - self.of_points(self.sense * limit_products / self.reserve)
         of_normal[rough] += self.friction * target[0]
-        normal, shear, motion = self._solved(of_normal, target[1:] - self.shear_error, self.unbalanced)
+        normal, shear, motion, relative = self._solved(of_normal, target[1:] - self.shear_error, self.unbalanced)
         multiplier = 0.0
         if self.unit is not None:
-            unit_normal, unit_shear, unit_motion = self.unit
+            unit_normal, unit_shear, unit_motion, unit_relative = self.unit
             by_unit = p.measured(unit_motion, self.forces(unit_normal, unit_shear))
             multiplier = (self.missing - p.measured(motion, self.forces(normal, shear))) / by_unit
             normal, shear = normal + multiplier * unit_normal, shear + multiplier * unit_shear
-            motion = motion + multiplier * unit_motion
+            motion, relative = motion + multiplier * unit_motion, relative + multiplier * unit_relative
         yielding = (limit_products + self.yielding * self.sense * normal[self.limited]) / self.reserve
-        slide = p.rows.relative(motion)
-        if p.unit_reaction is not None:
-            slide = slide + multiplier * p.unit_reaction
-        slide = slide[rough, 1:].T + p.compliance[rough, 1] * shear + self.shear_error
+        slide = relative[rough, 1:].T + p.compliance[rough, 1] * shear + self.shear_error
         # Of what the cone says of its first number the form in which little cancels.
         along = 2.0 * scaling.w[0] * inner(scaling.w[1:], target[1:] - slide)
         first = target[0] - (scaling.square * self.friction * normal[rough] + along) / (1.0 + 2.0 * self.length**2)

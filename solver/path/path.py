@@ -471,10 +471,6 @@ class Path:
         oldest, *later = state.history
         places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < bound)]
         while len(places) > 1 and not self.checks.in_equilibrium(places[-1], self.closed_gap):
-            # The path may have come here because blocks that the viscosity retards come to rest nearby.
-            if (resting := self.fall.relaxed(places[-1], JUMP)) is not None:
-                places[-1] = resting
-                break
             bound = min(bound, places.pop().s)
         step = (bound - places[-1].s) / 4.0
         return replace(state, place=places[-1], step=step, upper_bound=bound, history=tuple(places[:-1]))
