@@ -318,7 +318,7 @@ class Path:
             lost = standing.bonds.left.sum() < place.bonds.left.sum()
             lost |= np.isnan(standing.tie_lengths).sum() > np.isnan(place.tie_lengths).sum()
             check = self._check(place if lost else standing)
-            if check.bounds.in_equilibrium and check.measured > state.peak:
+            if check.bounds.in_equilibrium and (1.0 - DROP) * check.measured > state.peak:
                 self.state = replace(state, peak=check.measured)
                 yield self._report(check, place)
                 return
