@@ -9,10 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Iterations of the interior methods; mean product of forces, in block weights, and distances at which they have
-#: converged: small beside the compliance, which decides forces that equilibrium leaves open.
-ITERATIONS, CONVERGED = 60, 1e-12
-
 
 def inner(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(n,) array: inner products of columns; row by row, as numpy's sum along the first axis is four times as slow."""
@@ -74,10 +70,3 @@ class Scaling:
         along = inner(self.w[1:], a[1:])
         rest = a[1:] + (sign * a[0] + along / (1.0 + self.w[0])) * self.w[1:]
         return np.concatenate([(self.w[0] * a[0] + sign * along)[None], rest])
-
-    def hessian(self) -> np.ndarray:
-        """(n, d, d) array: W² = η² (2 w wᵀ - J)."""
-        d = len(self.w)
-        outer = 2.0 * self.w[:, None] * self.w[None]
-        outer -= np.diag([1.0] + [-1.0] * (d - 1))[:, :, None]
-        return np.moveaxis(outer * self.square, 2, 0)

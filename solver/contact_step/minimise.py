@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .factors import Solve
-from .interior import BALANCED, interior_point
-from .problem import ContactProblem, StepSolution
+from .interior import ACCEPTED, BALANCED, interior_point
+from .problem import ContactProblem, NotSolved, StepSolution
 
 #: Factorisations of Newton's method, and force out of balance, in block weights, were the blocks to go on as before or
 #: after the first one, that foretells more: the interior method, which takes 8 to 14 wherever it starts, takes over.
@@ -23,8 +23,13 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     """
     if len(problem.gap) == 0:
         motion = problem.load / problem.viscosity - problem.motion_so_far
-        return StepSolution(motion, problem.forces, problem.forces, multiplier)
-    return newton(problem, trial, multiplier) or interior_point(problem, multiplier)
+        return StepSolution(motion, problem.forces, problem.forces, multiplier, 0.0, 0.0)
+    solution = newton(problem, trial, multiplier) or interior_point(problem, multiplier)
+    # Numbers that are none are not accepted.
+    if not max(solution.imbalance, solution.error) <= ACCEPTED:
+        left = f"{solution.error:.1e} of the movement, {solution.imbalance:.1e} block weights out of balance"
+        raise NotSolved(f"the program of a step is solved to {left}")
+    return solution
 
 
 @np.errstate(all="ignore")  # A live load that no joint resists moves nothing along the control.
@@ -54,7 +59,7 @@ def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float)
         missing = 0.0 if problem.control is None else problem.control_target - float(problem.control @ motion)
         imbalance = float(np.abs(unbalanced).max())
         if imbalance < BALANCED * max(1.0, abs(multiplier)) and abs(missing) <= 1e-12 + BALANCED * problem.size:
-            return StepSolution(motion, forces, trial, multiplier)
+            return StepSolution(motion, forces, trial, multiplier, imbalance, abs(missing))
         if not (imbalance <= NEAR or (from_start and imbalance < np.inf)):
             break
         before, status = status, problem.status(trial)

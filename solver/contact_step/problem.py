@@ -44,6 +44,22 @@ class ContactProblem:
     #: (n_dof,): weights of the movements that make up the control displacement, one more equation; with its change.
     control: np.ndarray | None = None
     control_target: float = 0.0
+    #: (n,): friction coefficient of forces in equilibrium, whose bound grows with the normal force.
+    friction: np.ndarray | None = None
+    unit_reaction: np.ndarray | None = (
+        None  #: (n, d): parts of the forces that make up the reaction, where one is given
+    )
+    reaction: float = 0.0
+
+    def measured(self, motion: np.ndarray, forces: np.ndarray) -> float:
+        """Control displacement of a movement, or reaction of forces."""
+        if self.control is not None:
+            return float(self.control @ motion)
+        return 0.0 if self.unit_reaction is None else float((self.unit_reaction * forces).sum())
+
+    def missing(self, motion: np.ndarray, forces: np.ndarray) -> float:
+        """Tell what is missing of the control displacement or the reaction."""
+        return self.control_target + self.reaction - self.measured(motion, forces)
 
     def trial(self, motion: np.ndarray) -> np.ndarray:
         """(n, d) array: forces of the springs after a movement, without limits of contact and friction."""
@@ -86,4 +102,6 @@ class StepSolution:
     motion: np.ndarray  #: (n_dof,): movement of the free blocks
     forces: np.ndarray  #: (n, d)
     trial: np.ndarray  #: (n, d): trial forces, from which the next program starts
-    multiplier: float  #: of the live load
+    multiplier: float  #: of the live load, or of the reaction that is given
+    imbalance: float  #: largest force out of balance, in block weights
+    error: float  #: of the distances at the contact points, as a part of the movement

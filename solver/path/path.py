@@ -318,7 +318,7 @@ class Path:
             lost = standing.bonds.left.sum() < place.bonds.left.sum()
             lost |= np.isnan(standing.tie_lengths).sum() > np.isnan(place.tie_lengths).sum()
             check = self._check(place if lost else standing)
-            if check.bounds.in_equilibrium and check.measured > state.peak:
+            if check.bounds.in_equilibrium and (1.0 - DROP) * check.measured > state.peak:
                 self.state = replace(state, peak=check.measured)
                 yield self._report(check, place)
                 return
@@ -471,10 +471,6 @@ class Path:
         oldest, *later = state.history
         places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < bound)]
         while len(places) > 1 and not self.checks.in_equilibrium(places[-1], self.closed_gap):
-            # The path may have come here because blocks that the viscosity retards come to rest nearby.
-            if (resting := self.fall.relaxed(places[-1], JUMP)) is not None:
-                places[-1] = resting
-                break
             bound = min(bound, places.pop().s)
         step = (bound - places[-1].s) / 4.0
         return replace(state, place=places[-1], step=step, upper_bound=bound, history=tuple(places[:-1]))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.contact_step.balance import BalanceProblem, nearest_equilibrium
+from solver.contact_step.interior import ACCEPTED, BALANCED, interior_point
+from solver.contact_step.problem import ContactProblem, NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
@@ -212,23 +213,45 @@ class StaticProgram:
 
         Under a multiplier of the live load, and with a reaction [N or N·m] where one is given. Raises ``NotSolved``.
         """
-        assembly, least, unit_reaction, beyond = self.model.assembly, self.least, None, 0.0
-        matrix = wrench_matrix(self.contacts, self.pose, self.model.length)
-        if reaction is not None:
-            unit_reaction = self.work.reshape(least.shape)
-            beyond = reaction / self.unit - float((unit_reaction * least).sum())
-        problem = BalanceProblem(
-            rows=ContactRows(matrix, assembly.free, assembly.centroids),
-            reference=reference - least,
-            compliance=compliance,
-            friction=self.friction,
-            most=self.limits.beyond_least,
-            cohesion=self.limits.cohesion,
-            load=self.dead + multiplier * self.live,
-            unit_reaction=unit_reaction,
-            reaction=beyond,
+        least, load = self.least, self.dead + multiplier * self.live
+        # Those that can carry nothing would leave the program without an interior.
+        able = self.limits.beyond_least > BALANCED
+        if not able.any():
+            if np.abs(load).max(initial=0.0) > ACCEPTED:
+                raise NotSolved("nothing touches the free blocks")
+            return least
+        rows = ContactRows(
+            wrench_matrix(self.contacts, self.pose, self.model.length),
+            self.model.assembly.free,
+            self.model.assembly.centroids,
         )
-        return least + nearest_equilibrium(problem)
+        # Only ratios of the compliance matter.
+        rigid = np.isinf(self.limits.beyond_least)
+        none, unit_reaction = np.zeros_like(least[able]), None if reaction is None else self.work.reshape(least.shape)
+        problem = ContactProblem(
+            rows=rows[able],
+            gap=none[:, 0],
+            slip=none[:, 1:],
+            forces=(reference - least)[able],
+            bound=self.limits.cohesion[able],
+            friction=self.friction[able],
+            compliance=(compliance / compliance[rigid if rigid.any() else able, 0].mean())[able],
+            most=self.limits.beyond_least[able],
+            load=load,
+            viscosity=np.zeros_like(load),
+            motion_so_far=np.zeros_like(load),
+            size=1.0,
+            unit_reaction=None if unit_reaction is None else unit_reaction[able],
+            reaction=0.0 if reaction is None else reaction / self.unit - float((unit_reaction * least).sum()),
+        )
+        found = interior_point(problem)
+        if not found.imbalance <= ACCEPTED:
+            raise NotSolved(
+                f"forces nearest to an equilibrium leave {found.imbalance:.1e} block weights out of balance"
+            )
+        forces = least.copy()
+        forces[able] += found.forces
+        return forces
 
     def _solved(
         self,
