@@ -127,12 +127,12 @@ class Reports:
         driver = self.driver
         return Ending(Status.LIMIT_REACHED, f"the {driver.what} reached its limit of {driver.limit:g} {driver.unit}")
 
-    def locked(self, place: Place) -> Ending:
+    def locked(self, place: Place, remedy: str = "") -> Ending:
         """The ending that names the wedged blocks."""
         normal = place.forces[:, 0]
         assert place.contacts is not None
         words = wedged(self.model.assembly, place.contacts[normal > 0.1 * normal.max()])
-        return Ending(Status.LOCKED, f"{words} at {place.s:.6g} {self.driver.unit}")
+        return Ending(Status.LOCKED, f"{words} at {place.s:.6g} {self.driver.unit}{remedy}")
 
     def no_step(self, s: float, reason: str) -> Ending:
         """The ending at a step that was not solved, from a parameter s [m or rad]."""

@@ -301,23 +301,21 @@ class Stepper:
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
-        where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT
-        closed = (where_sliding, EXACT if exact else np.inf)
-        solved = self._solved(place, points, s, size, loads, resisting, before, closed)
-        new, points, left, motion_so_far, is_linearised = solved
-        movement_size = self._largest(motion_so_far * self._shares)
+        closed = (np.inf if in_time or viscosity == 1.0 else EXACT, EXACT if exact else np.inf)
+        new, points, left, movement, linear = self._solved(place, points, s, size, loads, resisting, before, closed)
+        movement_size = self._largest(movement * self._shares)
         all_points = self._with_missed(start, place, new.pose, movement_size)
         if len(all_points) > len(start):
             return self.step(place, length, in_time=in_time, viscosity=viscosity, exact=exact, candidates=all_points)
-        motion = np.where(free[:, None], self._of_blocks(motion_so_far), place.pose.movement_to(new.pose))
+        motion = np.where(free[:, None], self._of_blocks(movement), place.pose.movement_to(new.pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         new = self._arrived(place, replace(new, velocity=velocity, works=place.works), points, left, share)
         memory = tolerances.FRICTION_MEMORY if model.has_live else memory
         work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size, memory)
         # The first step has no earlier movement to compare with.
-        turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
+        turn = (in_time or place.velocity is not None) * self._largest((movement - before) * self._shares)
         penetration = self._penetration(points, new)
-        return new, motion / model.lengths, StepError(work, turn, movement_size, penetration, is_linearised)
+        return new, motion / model.lengths, StepError(work, turn, movement_size, penetration, linear)
 
     def gives(self, place: Place) -> bool:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""

@@ -556,6 +556,20 @@ def test_blocks_that_do_not_stand_as_drawn_are_told(gap, told):
     assert all("'block' moved by up to 0.005 m at once" in note and "as drawn" in note for note in response.notes)
 
 
+@pytest.mark.slow
+def test_blocks_that_are_wedged_as_drawn_end_the_path_with_what_to_do():
+    """Their forces grew by what they are in each other, with each program, in steps of 1e-5 of a block."""
+    ground = [rectangle(-1, -1, 4, 0), rectangle(-1, 0, 0, 1), rectangle(3, 0, 4, 1), rectangle(5, -1, 7, 0)]
+    stones = [*(rectangle(k, 0, k + 1.0002, 1) for k in range(3)), rectangle(5.2, 0, 6.2, 1)]
+    roles = ["fixed", "fixed", "fixed", "moving", *["free"] * 4]
+    assembly = solver.Assembly.from_outlines([*ground, *stones], roles=roles)
+    sinks = solver.Settlement((0, -1), increment=0.1, limit=0.2)
+    controls = replace(NO_FALL, overlap_tolerance=1e-3)
+    response = solver.settle(assembly, sinks, friction_coefficient=0.6, controls=controls)
+    assert response.stop is solver.Status.LOCKED
+    assert "as drawn they have no room: make their faces plane, or trim them" in response.message
+
+
 def test_forces_have_the_reaction_they_are_told_with_where_friction_bounds_it_to_neither_side():
     """Three blocks that two walls hold between them, one of which sinks."""
     outlines = [rectangle(k, 0.0, k + 1.0, 1.0) for k in range(5)]
