@@ -383,10 +383,10 @@ class Path:
         part = 1.0 / 3.0 if error.penetration > CLOSING_GAP else self.stepper.members.part_to_strength(place, new)
         if part < 1.0 and length > FIRST_STEP * unit:
             return replace(state, step=part * length), None
-        deep, pressed = error.penetration > CLOSING_GAP, new.forces[:, 0].max(initial=0.0) / self.model.total_load
-        if (deep or pressed > 100.0) and self._supports_locked(place):
+        deep, pressed, load = error.penetration > CLOSING_GAP, new.forces[:, 0].max(initial=0.0), self.model.total_load
+        if (deep or pressed > 100.0 * load) and self._supports_locked(place):
             return state, self.reports.locked(new)
-        if deep and pressed > 10.0:
+        if deep and pressed > 10.0 * load:
             return state, self.reports.locked(new, "; as drawn they have no room: make their faces plane, or trim them")
         works = self._works(place, new, motion)
         # Beside the work of the supports or the live load, unless that is next to nothing, or so beside the others.
