@@ -244,7 +244,7 @@ def test_killed_limit_loads_and_pushovers_resume(tmp_path, monkeypatch, kind, mo
     # What had been found was neither solved nor written again.
     after = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
     assert after == before
-    # The last one after a settlement is told without joints that close, too, and where they close by more, and each of a
+    # The last one after a settlement is told without joints that close, and where they close by more, too; each of a
     # load that moves without.
     limits = {"pushover": 0, "limit load": 5 - kept + 2 * (kept < 5), "load that moves": 2 * (5 - kept)}[kind]
     assert found == ["settlement_increments"] * (kind == "limit load") + ["limit_load"] * limits
