@@ -251,7 +251,8 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
     point = _Iterate(problem, multiplier)
     rigid, best, part = not problem.viscosity.any(), point.found(), 1.0
     for _ in range(ITERATIONS):
-        converged = point.mean <= CONVERGED and point.imbalance < BALANCED and point.error <= FITS * point.moved
+        fits = point.error <= FITS * point.moved
+        converged = point.mean <= CONVERGED and point.imbalance < BALANCED and fits
         # What is out of balance after a short step stays so: there is no equilibrium, or a reaction has too few digits.
         if converged or part < (1e-6 if point.imbalance <= ACCEPTED else 1e-3):
             break
@@ -282,7 +283,7 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
         # Of those in balance the last one is the best.
         best = min(point.found(), best, key=lambda found: max(found[0], BALANCED))
         # What a step was to take out of balance and has not is rounding.
-        if BALANCED < point.imbalance <= ACCEPTED and point.imbalance > (1.0 - 0.5 * part) * before:
+        if fits and BALANCED < point.imbalance <= ACCEPTED and point.imbalance > (1.0 - 0.5 * part) * before:
             break
     imbalance, error, forces, motion, multiplier = best
     return StepSolution(motion, forces, problem.trial(motion), multiplier, imbalance, error)

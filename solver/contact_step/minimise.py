@@ -24,12 +24,14 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     if len(problem.gap) == 0:
         motion = problem.load / problem.viscosity - problem.motion_so_far
         return StepSolution(motion, problem.forces, problem.forces, multiplier, 0.0, 0.0)
-    solution = newton(problem, trial, multiplier) or interior_point(problem, multiplier)
+    if (near := newton(problem, trial, multiplier)) is not None:
+        return near
+    found = interior_point(problem, multiplier)
     # Numbers that are none are not accepted.
-    if not max(solution.imbalance, solution.error) <= ACCEPTED:
-        left = f"{solution.error:.1e} of the movement, {solution.imbalance:.1e} block weights out of balance"
+    if not max(found.imbalance, found.error) <= ACCEPTED:
+        left = f"{found.error:.1e} of the movement, {found.imbalance:.1e} block weights out of balance"
         raise NotSolved(f"the program of a step is solved to {left}")
-    return solution
+    return found
 
 
 @np.errstate(all="ignore")  # A live load that no joint resists moves nothing along the control.

@@ -46,9 +46,8 @@ class ContactProblem:
     control_target: float = 0.0
     #: (n,): friction coefficient of forces in equilibrium, whose bound grows with the normal force.
     friction: np.ndarray | None = None
-    unit_reaction: np.ndarray | None = (
-        None  #: (n, d): parts of the forces that make up the reaction, where one is given
-    )
+    #: (n, d): parts of the forces that make up the reaction, where one is given.
+    unit_reaction: np.ndarray | None = None
     reaction: float = 0.0
 
     def measured(self, motion: np.ndarray, forces: np.ndarray) -> float:
