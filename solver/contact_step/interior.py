@@ -196,7 +196,8 @@ class _Iterate:
         if self.unit is not None:
             unit_normal, unit_shear, unit_motion, unit_relative = self.unit
             by_unit = p.measured(unit_motion, self.forces(unit_normal, unit_shear))
-            multiplier = (self.missing - p.measured(motion, self.forces(normal, shear))) / by_unit
+            # A live load that moves nothing along the control leaves no number.
+            multiplier = float(np.divide(self.missing - p.measured(motion, self.forces(normal, shear)), by_unit))
             normal, shear = normal + multiplier * unit_normal, shear + multiplier * unit_shear
             motion, relative = motion + multiplier * unit_motion, relative + multiplier * unit_relative
         yielding = (limit_products + self.yielding * self.sense * normal[self.limited]) / self.reserve
