@@ -35,6 +35,7 @@ def table(page, name):
     }
 
 
+@pytest.mark.slow
 def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_path, capsys):
     out = tmp_path / "both"
     assert main(["compare", str(arch_results), str(other), "-o", str(out), "--animation", "none"]) == 0

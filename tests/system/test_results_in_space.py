@@ -488,6 +488,7 @@ def test_corners_of_a_still_lie_in_shade(tmp_path):
     assert tread.max() - tread.min() > 40
 
 
+@pytest.mark.slow
 def test_views_that_cannot_be_are_refused_with_the_remedy(tmp_path):
     response, path = vault_response(), tmp_path / "still.png"
     for of, words in (

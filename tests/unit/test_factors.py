@@ -45,6 +45,7 @@ def test_of_a_dome_of_wide_rings(with_places):
     assert error_of(rows, 1) < 1e-10
 
 
+@pytest.mark.slow
 def test_of_two_walls_that_stand_apart():
     """The first cut is of no block."""
     cubes = [

@@ -208,6 +208,7 @@ def test_files_tell_the_units_of_their_phase(tmp_path):
     assert "settlement [rad]" in list(run.response.joints(last).field_data["units"])
 
 
+@pytest.mark.slow
 def test_the_last_equilibrium_before_a_phase_that_falls_at_once_keeps_the_units_of_its_own_motion(tmp_path):
     (tmp_path / "case.toml").write_text(
         '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 5 }\n[analysis]\nfalling_frames = 1\n'

@@ -80,6 +80,7 @@ def test_a_load_is_shown_at_its_positions_and_nowhere_between(words):
         assert f"α = {alpha[place]}" in title
 
 
+@pytest.mark.slow
 def test_a_frame_between_two_results_has_its_place_on_the_curve(words):
     response = replace(arch_response(), collapse=None, increments=arch_response().path[::4])
     filmed(response, fps=12.0)
