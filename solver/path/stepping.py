@@ -301,8 +301,10 @@ class Stepper:
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
-        closed = (np.inf if in_time or viscosity == 1.0 else EXACT, EXACT if exact else np.inf)
-        new, points, left, movement, linear = self._solved(place, points, s, size, loads, resisting, before, closed)
+        where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT
+        closed = (where_sliding, EXACT if exact else np.inf)
+        solved = self._solved(place, points, s, size, loads, resisting, before, closed)
+        new, points, left, movement, is_linearised = solved
         movement_size = self._largest(movement * self._shares)
         all_points = self._with_missed(start, place, new.pose, movement_size)
         if len(all_points) > len(start):
@@ -315,7 +317,7 @@ class Stepper:
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((movement - before) * self._shares)
         penetration = self._penetration(points, new)
-        return new, motion / model.lengths, StepError(work, turn, movement_size, penetration, linear)
+        return new, motion / model.lengths, StepError(work, turn, movement_size, penetration, is_linearised)
 
     def gives(self, place: Place) -> bool:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""
