@@ -254,8 +254,9 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
     for _ in range(ITERATIONS):
         fits = point.error <= FITS * point.moved
         converged = point.mean <= CONVERGED and point.imbalance < BALANCED and fits
-        # What is out of balance after a short step stays so: there is no equilibrium, or a reaction has too few digits.
-        if converged or part < (1e-6 if point.imbalance <= ACCEPTED else 1e-3):
+        # Of forces in equilibrium what is out of balance after a short step stays so: there are none, or a reaction has
+        # too few digits. Springs have a minimum.
+        if converged or (rigid and part < (1e-6 if point.imbalance <= ACCEPTED else 1e-3)):
             break
         try:
             point.factorise()
@@ -281,10 +282,11 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
             break
         if rigid and point.least_forces() > LARGEST_FORCES:
             raise NotSolved("no forces are in equilibrium: a movement gains more than they can take")
-        # Of those in balance the last one is the best.
-        best = min(point.found(), best, key=lambda found: max(found[0], BALANCED))
+        # Of those in balance the last one is the best; springs have one movement, rigid points any.
+        best = min(point.found(), best, key=lambda found: max(found[0], BALANCED if rigid else found[1], BALANCED))
         # What a step was to take out of balance and has not is rounding.
-        if fits and BALANCED < point.imbalance <= ACCEPTED and point.imbalance > (1.0 - 0.5 * part) * before:
+        near = max(point.error, point.mean) <= FITS * point.moved
+        if near and BALANCED < point.imbalance <= ACCEPTED and point.imbalance > (1.0 - 0.5 * part) * before:
             break
     imbalance, error, forces, motion, multiplier = best
     return StepSolution(motion, forces, problem.trial(motion), multiplier, imbalance, error)
