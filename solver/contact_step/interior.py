@@ -71,8 +71,8 @@ class _Iterate:
         # are in each other by.
         self.size = max(p.size, 1e-5, -float(p.gap.min()))
         mean = 0.03 * self.size
-        # The start lies well inside limits and cones.
-        before = p.forces[:, 0]
+        # The start lies well inside limits and cones, and what is farther open than the step is long carries nothing.
+        before = np.where(p.gap < self.size, p.forces[:, 0], 0.0)
         normal = np.maximum(before, 0.3)
         opening = np.maximum(p.gap, mean / normal)
         normal = np.where(before > 0.0, normal, np.minimum(normal, mean / opening))

@@ -86,6 +86,7 @@ def test_a_way_that_turns_back_beyond_its_step_is_followed():
         ("voronoi", 50008),  # A place that a long step did not hold counted as a bound of the short ones after it.
         ("voronoi", 51086),  # What falls past an equilibrium was told to have none.
         ("arch", 51065),  # Where the supports lock was not told.
+        ("cuts", 500019),  # Programs of steps were given up where their first iterations are short.
     ],
 )
 @pytest.mark.slow
