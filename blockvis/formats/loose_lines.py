@@ -489,15 +489,15 @@ def _closed_by_outlines(
     """
     grid, joints = GRID * size, {lines[k].layer for border in borders for k in border}
     segments = tree.geometries[[line.layer in joints for line in lines]]
+    if not joints or not areas:
+        return []
     # Frames and backgrounds are around faces; an ignored outline that lines cross is as if it were not there.
+    frames = {*shapely.STRtree(faces).query([*areas.values()], "contains_properly")[0].tolist()}
     beside = [
         area
-        for i, area in areas.items()
-        if not shapely.contains_properly(area, faces).any()
-        and not (i in ignored and _crossed(area, [*segments], 2 * MEETS * size))
+        for n, (i, area) in enumerate(areas.items())
+        if n not in frames and not (i in ignored and _crossed(area, [*segments], 2 * MEETS * size))
     ]
-    if not joints or not beside:
-        return []
     taken = shapely.STRtree([*faces, *beside])
     noded = shapely.union_all([*segments, *map(shapely.get_exterior_ring, beside)], grid_size=grid)
     return [
