@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
-from blockvis.layout.outlines import ends_of, ring_width
+from blockvis.layout.outlines import ends_of, ring_area, ring_width
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
@@ -29,6 +29,9 @@ SHORTENED = 0.05
 #: A face is a strip of mortar if it is narrower than this fraction of the typical stone, by area, and has stones along
 #: this share of its border: along both long sides.
 STRIP, BETWEEN = 0.25, 0.7
+
+#: Faces of more than so many times the median area may be openings.
+MAYBE_OPENING = 4.0
 
 #: From this number and share of the faces on, strips are joints drawn as pairs of lines.
 LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
@@ -131,7 +134,10 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
         said = f"{counted(len(found.faces), 'block is a face', 'blocks are faces')} between "
         said += f"{counted(len(lines), 'loose line')}{f', {n_closed} of them beside outlines' if n_closed else ''}"
         said += "; an opening enclosed by lines counts as a block too: "
-        found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines"))
+        areas = np.abs([ring_area(face.ring) for face in found.faces])
+        largest, times = int(areas.argmax()), float(areas.max() / np.median(areas))
+        doubt = f"; 'face {largest}' has {times:.2g} times the median area" if times > MAYBE_OPENING else ""
+        found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines{doubt}"))
     return found
 
 

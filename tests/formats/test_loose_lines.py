@@ -253,12 +253,12 @@ def test_stones_drawn_by_lines_close_beside_outlines(tmp_path):
         for y, right, miss in ((0, 900, 0.0), (200, 800, 0.08), (400, 900, 0.0)):
             quoin = [(right + miss / 2, y + miss), (900, y), (1000, y), (1000, y + 200), (right + miss / 2, y + 200)]
             space.add_lwpolyline(quoin, close=True)
-            space.add_lwpolyline([(1300, y), (1600, y), (1600, y + 200), (1300, y + 200)], close=True)
-            space.add_line((0, y), (800 if y else 1600, y))
+            space.add_lwpolyline([(1900, y), (2200, y), (2200, y + 200), (1900, y + 200)], close=True)
+            space.add_line((0, y), (800 if y else 2200, y))
             for x in (0, right - 500):
                 space.add_line((x, y), (x, y + 200))
         space.add_line((0, 600), (900, 600))
-        space.add_lwpolyline([(900, 600), (1600, 600), (1600, 800), (900, 800)], close=True)
+        space.add_lwpolyline([(900, 600), (2200, 600), (2200, 800), (900, 800)], close=True)
 
     drawing = read_layout(dxf(tmp_path, draw))
     areas = [shapely.Polygon(ring).area for ring in drawing.outlines if np.max(ring[:, 0]) < 0.95]
@@ -267,6 +267,10 @@ def test_stones_drawn_by_lines_close_beside_outlines(tmp_path):
     says = "6 blocks are faces between 10 loose lines, 3 of them beside outlines"
     assert any(note.startswith(says) for note in drawing.notes)
     assert not any("left out" in note for note in drawing.notes)
+    # Where a second line closes the door it counts as a block, which the note names.
+    shut = read_layout(dxf(tmp_path, lambda space: [draw(space), space.add_line((1000, 0), (1000, 600))]))
+    door = shut.names[int(np.argmax([shapely.Polygon(ring).area for ring in shut.outlines]))]
+    assert any(note.endswith(f"; '{door}' has 5.4 times the median area") for note in shut.notes)
 
 
 def pairs_of_lines(space, half, framed):
