@@ -429,7 +429,8 @@ LOADS = Section(
         Key("edge", whole(1), "In the plane, number of the edge into which the pressure pushes, counter-clockwise "
             "from the first corner, in whichever sense it is drawn", 2, otherwise="the faces in the way of direction"),
         Key("positions", _PLACES,
-            "Places x of a live force that moves over what is topmost there", [-1.9, 1.9, 77], "m", otherwise="none"),
+            "Places x of a live force that moves over what is topmost there; several such forces, as axles, move "
+            "together, over as many places each", [-1.9, 1.9, 77], "m", otherwise="none"),
         Key("y", NUMBER, "The y of all positions, of blocks in space", 0.5, "m", otherwise="none"),
         Key("phase", whole(1), "Number of the [[settlement]] from which on a dead load acts", 2, default=1),
     ),

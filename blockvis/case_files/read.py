@@ -239,11 +239,13 @@ def _bonds(top: Table, file: str | None) -> tuple[Bonding, ...]:
 
 def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
     """Check that the keys of a case fit its kind of analysis; ``settings`` are what each kind has read, by its name."""
-    moving = [k for k, load in enumerate(case.loads, start=1) if load.positions]
-    if len(moving) > 1:
-        raise ValueError(
-            f"{case.source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does"
-        )
+    places = {k: len(load.positions) for k, load in enumerate(case.loads, start=1) if load.positions}
+    for k, number in places.items():
+        if number != (first := next(iter(places.values()))):
+            raise ValueError(
+                f"{case.source}: [loads {k}] positions: loads that move do so together, as the axles of one vehicle, "
+                f"over as many places; the first of them has {first}, this one {number}"
+            )
     for name, other in KINDS.items():
         if name != case.analysis:
             other.refuse(settings[name], case)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -102,24 +102,26 @@ def loads_of(
 def moving_loads(
     entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path
 ) -> tuple[np.ndarray, Callable[[int], solver.PointForces]]:
-    """Find the load that moves: its (n,) positions [m], none where none does, and the live load at each, by number.
+    """Find the loads that move together: (n,) positions [m] of the first, none where none does, and all there.
 
     ValueError for a position above no block, or above a support.
     """
-    moving = next(((number, load) for number, load in enumerate(entries, start=1) if load.positions), None)
-    if moving is None:
-        return np.zeros(0), lambda k: solver.PointForces.at(k, (), ())
-    number, load = moving
+    moving = [(number, load) for number, load in enumerate(entries, start=1) if load.positions]
 
-    def at(x: float) -> solver.PointForces:
+    def on_top(load: LoadCase, x: float) -> solver.PointForces:
         if assembly.dimension == 2:
             return solver.force_on_top(assembly, x, load.force)
         return _force_on_top_in_space(assembly, x, load.y or 0.0, load.force)
 
-    with naming(f"{source}: [loads {number}] positions"):
-        for x in load.positions:
-            at(x)
-    return np.array(load.positions), lambda k: at(load.positions[k])
+    def at(k: int) -> solver.PointForces:
+        each = [on_top(load, load.positions[k]) for _, load in moving]
+        return solver.PointForces(*(np.concatenate([getattr(one, f.name) for one in each]) for f in fields(each[0])))
+
+    for number, load in moving:
+        with naming(f"{source}: [loads {number}] positions"):
+            for x in load.positions:
+                on_top(load, x)
+    return np.array(moving[0][1].positions if moving else ()), at
 
 
 def _force_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force: Sequence[float]) -> solver.PointForces:

@@ -46,6 +46,7 @@ _STIFFNESS = Plausible("Pa/m", 1e3, math.inf, "softer than foam", "", (("GPa/m, 
 PLAUSIBLE = {
     "density": Plausible("kg/m³", 100.0, 12000.0, "lighter than masonry", "heavier than lead", (("t/m³", 1e3, 8.0),
         ("kN/m³", 1e3 / solver.GRAVITY, math.inf), ("N/m³", 1.0 / solver.GRAVITY, math.inf), ("g/m³", 1e-3, math.inf))),
+    "thickness": Plausible("m", 0.0, 75.0, "", "deeper than any wall or vault", (("mm", 1e-3, math.inf),)),
     "unit_weight": Plausible("N/m³", 100.0, math.inf, "lighter than any fill", "", (("kN/m³", 1e3, math.inf),)),
     "cohesion": Plausible("Pa", 10.0, math.inf, "next to nothing", "", _STRESS),
     "tensile_strength": Plausible("Pa", 10.0, math.inf, "next to nothing", "", _STRESS),
@@ -75,6 +76,8 @@ def _numbers(case: Case, assembly: solver.Assembly) -> Iterator[tuple[str, str, 
     if len(densities):
         yield "", "density", float(np.min(densities))
         yield "", "density", float(np.max(densities))
+    if case.thickness is not None:
+        yield "[geometry]", "thickness", case.thickness
     laws = {"[material]": case.law}
     laws |= {f"[[interfaces]] {' and '.join(pair)}": law for pair, law in case.interfaces.items()}
     for where, law in laws.items():

@@ -62,8 +62,9 @@ def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> 
     speck = SPECK_OF_NOISE if noisy else SPECK
     regions = regions_of(labels.numbers, None if smallest is None else smallest / placement.pixel, speck)
     _check_stones(labels, regions, placement)
+    paper = _paper_at_rim(regions) if labels.is_of_lines else []
     if smallest is None:
-        _check_sizes(regions, placement)
+        _check_sizes(np.delete(regions.areas, paper), regions.specks[0], placement)
     found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
     holes = {k: inner for k, inner in found.holes.items() if _is_open(found.rings[k], inner, regions.smallest)}
     filled = [k for k in found.holes if k not in holes]
@@ -75,11 +76,12 @@ def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> 
         text = f"pinholes were filled, less than {100 * PINHOLES:g} % of their stone or {size:.3g} m across (smallest)"
         notes = (*notes, Note(CHANGED, f"{text}, of {len(filled)}, the first '{names[filled[0]]}'"))
     if labels.is_mask and not (reading.ignore or reading.only):
-        notes = (*notes, *maybe_openings(rings, names, holes))
+        notes = (*notes, *maybe_openings(rings, names, {*holes, *paper}))
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
     if not labels.is_of_lines:
         _check_holes(labels, regions, holes)
-    around = {}
+    message = "reaches the rim of the image, and is as large as paper; if it is a stone, close its lines there"
+    around = {k: LeftOut("paper", rings[k], f"'{names[k]}' {message}") for k in paper}
     for k, inner in holes.items():
         placed = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
         message = f"'{names[k]}' has {counted(len(placed), 'hole')}; fill them, or give what lies around the stones as "
@@ -125,17 +127,25 @@ def _check_holes(labels: Labels, regions: Regions, holed: Collection[int]) -> No
         )
 
 
-def _check_sizes(regions: Regions, placement: Placement) -> None:
+def _paper_at_rim(regions: Regions) -> list[int]:
+    """Regions of a drawing of lines that the rim of the image closes, such as the sky and the opening of an arch."""
+    rows = regions.numbers
+    rim = np.unique(np.concatenate([rows[0], rows[-1], rows[:, 0], rows[:, -1]])) - 1
+    least = MAYBE_OPENING * float(np.median(regions.areas))
+    return [k for k in rim.tolist() if k >= 0 and regions.areas[k] >= least]
+
+
+def _check_sizes(areas: np.ndarray, specks: int, placement: Placement) -> None:
     """Refuse charts, screens and drawings of results: their regions are mostly letters, strokes and specks."""
-    n, (specks, _) = len(regions.areas), regions.specks
-    small = np.sort(regions.areas)[: n // 2].sum() / regions.areas.sum()
+    n = len(areas)
+    small = np.sort(areas)[: n // 2].sum() / areas.sum()
     if specks > max(MOST_SPECKS, SPECKS_OF_ONE * n):
         why = f"it has {counted(specks, 'speck')} beside {counted(n, 'region')}"
     elif n >= FEWEST_OF_CHART and small < LEAST_OF_SMALL:
         why = f"{n // 2} of its {n} regions hold {100.0 * small:.2g} % of the area, as letters and strokes do"
     else:
         return
-    size = 0.2 * placement.pixel * float(np.sqrt(np.median(regions.areas[regions.areas >= np.mean(regions.areas)])))
+    size = 0.2 * placement.pixel * float(np.sqrt(np.median(areas[areas >= np.mean(areas)])))
     raise ValueError(
         f"it is no picture of stones but a chart, a screen or a shaded drawing: {why}; make a mask of its stones "
         f"({MASK_MAKERS}), or, if they are stones and specks, say from what size across they are stones: smallest = "

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
-from blockvis.layout.outlines import ends_of, ring_width
+from blockvis.layout.outlines import ends_of, ring_area, ring_width
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
@@ -29,6 +29,9 @@ SHORTENED = 0.05
 #: A face is a strip of mortar if it is narrower than this fraction of the typical stone, by area, and has stones along
 #: this share of its border: along both long sides.
 STRIP, BETWEEN = 0.25, 0.7
+
+#: Faces of more than so many times the median area may be openings.
+MAYBE_OPENING = 4.0
 
 #: From this number and share of the faces on, strips are joints drawn as pairs of lines.
 LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
@@ -124,13 +127,17 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     outlined = dict(zip(usable, flat[len(lines) :], strict=True))
     cutting, openings = _cut_outlines(outlined, ignored, segments, every, size, found)
     rest = np.setdiff1d(np.arange(len(lines)), [*cutting])
-    _add_faces([lines[k] for k in rest], segments[rest], kept, every, size, found)
+    n_closed = _add_faces([lines[k] for k in rest], segments[rest], outlined, ignored, every, size, found)
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
     found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
     if found.faces:
         said = f"{counted(len(found.faces), 'block is a face', 'blocks are faces')} between "
-        said += f"{counted(len(lines), 'loose line')}; an opening enclosed by lines counts as a block too: "
-        found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines"))
+        said += f"{counted(len(lines), 'loose line')}{f', {n_closed} of them beside outlines' if n_closed else ''}"
+        said += "; an opening enclosed by lines counts as a block too: "
+        areas = np.abs([ring_area(face.ring) for face in found.faces])
+        largest, times = int(areas.argmax()), float(areas.max() / np.median(areas))
+        doubt = f"; 'face {largest}' has {times:.2g} times the median area" if times > MAYBE_OPENING else ""
+        found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines{doubt}"))
     return found
 
 
@@ -300,6 +307,9 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
     # An end on a curve hangs between it and its chord: the curve gets a corner there.
     curves = {j: off for j, off in enumerate(offs) if off > 0.0}
     flat = _with_corners(flat, n, curves, MEETS * size, MEETS * size)
+    # What meets a line stays on it where an end of that moves.
+    every = dict.fromkeys(range(len(flat)), 0.0)
+    flat = _with_corners(flat, n, every, GRID * size, 0.0)
     others = _lines(flat)
     tree = shapely.STRtree(others)
     which, other = tree.query(shapely.points(ends_of(flat[:n])), "intersects")
@@ -323,7 +333,7 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
         said = f"joined: {missed} that missed another by up to {max(far):.3g} units"
         found.notes.append(Note(CHANGED, said))
     # On the grid an end and a slanted line that it meets would be rounded apart.
-    return _with_corners(flat, n, dict.fromkeys(range(len(flat)), 0.0), GRID * size, 0.0)
+    return _with_corners(flat, n, every, GRID * size, 0.0)
 
 
 def _with_corners(
@@ -406,40 +416,117 @@ def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
 
 
 def _add_faces(
-    lines: list[Line], segments: np.ndarray, outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
-) -> None:
-    """Add the faces between lines that cut no outline, and the lines that enclose nothing."""
+    lines: list[Line],
+    segments: np.ndarray,
+    outlines: dict[int, np.ndarray],
+    ignored: Set[int],
+    every: Any,
+    size: float,
+    found: Faces,
+) -> int:
+    """Add the faces between lines that cut no outline, and the lines that enclose nothing; how many outlines close."""
     if not lines:
-        return
+        return 0
     grid, paths = GRID * size, {line.layer: line.within or (line.layer,) for line in lines}
     faces, cuts, dangles, _ = shapely.polygonize_full([shapely.union_all(segments, grid_size=grid)])
     loose = shapely.union_all([dangles, cuts]).buffer(2 * grid)
     shapely.prepare(loose)
     alone = [lines[k] for k in np.flatnonzero(shapely.covers(loose, segments))]
     found.left_out += [line.left_out("open", _open_message(line), f"line {line.handle}") for line in alone]
-    tree = shapely.STRtree(segments)
-    drawn, borders = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines]), list[set[int]]()
-    for face in faces.geoms:
+    tree, areas = shapely.STRtree(segments), {i: shapely.Polygon(ring).buffer(0) for i, ring in outlines.items()}
+    drawn, whole, borders = (
+        shapely.STRtree([areas[i] for i in areas if i not in ignored]),
+        list[Any](),
+        list[set[int]](),
+    )
+
+    def add(face: Any) -> None:
         ring = np.array(shapely.orient_polygons(face).exterior.coords)[:-1]
-        middles = shapely.points((ring + np.roll(ring, -1, axis=0)) / 2.0)
-        border = tree.nearest(middles).tolist()
+        border = _border(ring, tree, 2 * grid)
         nearest = [lines[k].layer for k in border]
         layer = max(sorted(set(nearest)), key=nearest.count)
         ring = _sharpened(ring, every, grid)
         if len(face.interiors):
             found.left_out.append(_with_a_hole(face, ring, layer))
-            continue
+            return
         inner = face.buffer(-10 * grid)
         over = drawn.geometries[drawn.query(inner, "intersects")]
         # Within an outline it may be a block in a frame: that is judged when all outlines are there.
         if not shapely.covers(over, inner).all():
             message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
             found.left_out.append(LeftOut("across", ring, message, layer, "face"))
-            continue
+            return
         within = tuple(word for one in sorted({*nearest}) for word in paths[one] if word)
         found.faces.append(Face(ring, paths[layer], within))
+        whole.append(face)
         borders.append({*border})
+
+    for face in faces.geoms:
+        add(face)
+    closed = _closed_by_outlines(lines, tree, whole, borders, areas, ignored, size)
+    for face in closed:
+        add(face)
+    if closed:
+        found.left_out = _still_left_out(found.left_out, closed, drawn.geometries, grid)
     found.notes += _crossing_notes(lines, segments, borders, MEETS * size)
+    return len(closed)
+
+
+def _border(ring: np.ndarray, tree: Any, reach: float) -> list[int]:
+    """Numbers of the lines (an STRtree) along the edges of a face, one for each edge that lies on a line."""
+    middles = shapely.points((ring + np.roll(ring, -1, axis=0)) / 2.0)
+    on, line = tree.query_nearest(middles, max_distance=reach, all_matches=False)
+    return [int(k) for k in line[np.argsort(on, kind="stable")]]
+
+
+def _closed_by_outlines(
+    lines: Sequence[Line],
+    tree: Any,
+    faces: Sequence[Any],
+    borders: Sequence[Set[int]],
+    areas: dict[int, Any],
+    ignored: Set[int],
+    size: float,
+) -> list[Any]:
+    """Stones of which outlines beside them are a part of the border, as beside quoins, in a wall drawn by lines.
+
+    Only lines of layers that enclose faces by themselves are joints for certain, and one alone, as the ground line
+    below a door or a dimension, closes nothing.
+    """
+    grid, joints = GRID * size, {lines[k].layer for border in borders for k in border}
+    segments = tree.geometries[[line.layer in joints for line in lines]]
+    if not joints or not areas:
+        return []
+    # Frames and backgrounds are around faces; an ignored outline that lines cross is as if it were not there.
+    frames = {*shapely.STRtree(faces).query([*areas.values()], "contains_properly")[0].tolist()}
+    beside = [
+        area
+        for n, (i, area) in enumerate(areas.items())
+        if n not in frames and not (i in ignored and _crossed(area, [*segments], 2 * MEETS * size))
+    ]
+    taken = shapely.STRtree([*faces, *beside])
+    noded = shapely.union_all([*segments, *map(shapely.get_exterior_ring, beside)], grid_size=grid)
+    return [
+        face
+        for face in shapely.polygonize([*shapely.get_parts(noded)]).geoms
+        if not len(face.interiors)
+        and not len(taken.query(face.buffer(-10 * grid), "intersects"))
+        and len({*_border(np.array(face.exterior.coords)[:-1], tree, 2 * grid)}) > 1
+    ]
+
+
+def _still_left_out(left_out: Sequence[LeftOut], closed: Sequence[Any], outlines: Any, grid: float) -> list[LeftOut]:
+    """Leave out no longer the lines around faces that outlines close, nor what these are pieces of."""
+    around = shapely.union_all(shapely.get_exterior_ring(closed)).buffer(2 * grid)
+    filled = shapely.union_all([*closed, *outlines]).buffer(10 * grid)
+
+    def is_left_out(item: LeftOut) -> bool:
+        if item.kind == "across":
+            return not filled.covers(shapely.Polygon(item.points))
+        line = shapely.LineString(item.points)
+        return item.kind != "open" or bool(line.intersection(around).length < 0.5 * line.length)
+
+    return [*filter(is_left_out, left_out)]
 
 
 def _with_a_hole(face: Any, ring: np.ndarray, layer: str) -> LeftOut:

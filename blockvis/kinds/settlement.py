@@ -39,6 +39,9 @@ COULOMB, LINEAR_PROGRAM = mechanics.INCREMENTS
 #: Difference of two reactions, in weights, of moments at a block's length, that is worth a line.
 NOTABLE = 1e-3
 
+#: What a reaction is where not every point of the supports moves by s.
+WORK = "the work on the supports over s, which do not all move by it alone: what each bears is in supports.csv"
+
 
 class SettlementKind(AnalysisKind):
     """Settlements, one after another, and the reaction of the supports."""
@@ -132,6 +135,8 @@ class SettlementKind(AnalysisKind):
                 )
             if path[0].reaction < -NOTABLE * _size(response, path[0].phase):
                 lines[-1] += "   against the movement: by itself the structure would push these supports the other way"
+            if _is_work(response):
+                lines.append(f"reactions are {WORK}")
             lines += _held_down(response)
             if _is_idle(response):
                 lines.append("no free block touches the supports that move: nothing follows them")
@@ -191,6 +196,7 @@ class SettlementKind(AnalysisKind):
             if _rests_elsewhere(response):
                 rows.append(("reaction at rest", reaction(path[0].reaction, path[0].phase)))
             rows.append(("last reaction", reaction(path[-1].reaction, path[-1].phase) + _last_reaction(response)[1]))
+            rows += [("reactions", WORK)] if _is_work(response) else []
         return rows
 
 
@@ -253,6 +259,16 @@ def _held_down(response: solver.Response) -> list[str]:
         return []
     doubt = "doubt faces of theirs that are steep or overhang"
     return [f"below 0 these supports, which sink, hold the structure down: {doubt}"]
+
+
+def _is_work(response: solver.Response) -> bool:
+    """Whether supports turn as they go, or do not all go as far, so that a reaction is no load on a foundation."""
+    for motion in response.settlements:
+        each = {tuple(one) for one in (motion.profile or {}).values()}
+        turns = any(any(one[response.assembly.dimension :]) for one in each) or motion.rotation != 0.0
+        if len(each) > 1 or (turns and motion.unit == "m"):
+            return True
+    return False
 
 
 def _is_idle(response: solver.Response) -> bool:

@@ -17,6 +17,7 @@ KINDS = {
     "axis": ("line in the line type of an axis", "lines in line types of axes"),
     "across": ("face of loose lines across outlines", "faces of loose lines across outlines"),
     "hole": ("face with a hole", "faces with a hole"),
+    "paper": ("sheet of paper up to the rim of the image", "sheets of paper up to the rim of the image"),
     "pieces": ("face in several pieces", "faces in several pieces"),
     "no outline": ("face without outline", "faces without outline"),
     "no area": ("outline without area", "outlines without area"),

@@ -153,8 +153,8 @@ class ControlledLoad(Driver):
         self.arm = np.zeros(d) if chosen.point is None else np.asarray(chosen.point) - assembly.centroids[self.block]
         self.begun = start.positions[self.block] + self._turned(start)
         self.misdirected = (
-            f"the mechanism does not move block '{chosen.block}' along {chosen.direction or 'x'}; choose another "
-            "control block, point or direction"
+            f"the mechanism does not move block '{chosen.block}' along {chosen.direction or 'x'}; turn the "
+            "direction round if it moves it the other way, or choose another control block, point or direction"
         )
 
     def supports(self, s: float) -> Pose:

@@ -521,6 +521,18 @@ def test_of_a_drawing_of_lines_the_largest_regions_may_be_openings(tmp_path, sil
     assert any(note.startswith(said) for note in notes) == (sill == 240)
 
 
+def test_paper_that_the_rim_closes_is_no_stone(tmp_path):
+    # Above and below voussoirs between abutments, beside which they are as small as letters.
+    image = Image.new("L", (540, 260), 255)
+    draw = ImageDraw.Draw(image)
+    for box in [(0, 80, 60, 200), (480, 80, 539, 200), *((60 + 20 * k, 100, 80 + 20 * k, 114) for k in range(21))]:
+        draw.rectangle(box, outline=0, width=2)
+    image.save(tmp_path / "arch.png")
+    layout = read_layout(tmp_path / "arch.png", pixel=0.01)
+    assert (layout.n_blocks, [item.kind for item in layout.left_out]) == (23, ["paper"] * 2)
+    assert max(np.ptp(ring[:, 0]) for ring in layout.outlines) < 0.62
+
+
 def test_a_pinhole_does_not_lose_its_stone(tmp_path):
     image, n = drawn_wall()
     ImageDraw.Draw(image).rectangle((40, 30, 43, 33), fill=0)

@@ -246,6 +246,33 @@ def test_joints_that_end_on_slanted_beds_cut_them(tmp_path):
     assert not any("joined" in note for note in drawing.notes)
 
 
+def test_stones_drawn_by_lines_close_beside_outlines(tmp_path):
+    # A bed that misses the corner of a quoin is moved to it, and the head joints that end on it with it. A door that a
+    # ground line alone closes is none.
+    def draw(space):
+        for y, right, miss in ((0, 900, 0.0), (200, 800, 0.08), (400, 900, 0.0)):
+            quoin = [(right + miss / 2, y + miss), (900, y), (1000, y), (1000, y + 200), (right + miss / 2, y + 200)]
+            space.add_lwpolyline(quoin, close=True)
+            space.add_lwpolyline([(1900, y), (2200, y), (2200, y + 200), (1900, y + 200)], close=True)
+            space.add_line((0, y), (800 if y else 2200, y))
+            for x in (0, right - 500):
+                space.add_line((x, y), (x, y + 200))
+        space.add_line((0, 600), (900, 600))
+        space.add_lwpolyline([(900, 600), (2200, 600), (2200, 800), (900, 800)], close=True)
+
+    drawing = read_layout(dxf(tmp_path, draw))
+    areas = [shapely.Polygon(ring).area for ring in drawing.outlines if np.max(ring[:, 0]) < 0.95]
+    assert areas == pytest.approx([0.08, 0.06, 0.08] + [0.1] * 3, rel=1e-3)
+    assert drawing.n_blocks == 6 + 7
+    says = "6 blocks are faces between 10 loose lines, 3 of them beside outlines"
+    assert any(note.startswith(says) for note in drawing.notes)
+    assert not any("left out" in note for note in drawing.notes)
+    # Where a second line closes the door it counts as a block, which the note names.
+    shut = read_layout(dxf(tmp_path, lambda space: [draw(space), space.add_line((1000, 0), (1000, 600))]))
+    door = shut.names[int(np.argmax([shapely.Polygon(ring).area for ring in shut.outlines]))]
+    assert any(note.endswith(f"; '{door}' has 5.4 times the median area") for note in shut.notes)
+
+
 def pairs_of_lines(space, half, framed):
     """A wall of 6 courses with joints of twice ``half``; without a frame the beds are open at their ends."""
     if framed:

@@ -571,7 +571,10 @@ MOVING = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\npositions = {}\n'
         (LIMIT + MOVING.format("[-1.0, 5.0, 4]"), ["[loads 1] positions: ", "reaches from"]),
         (LIMIT + MOVING.format("[0.0, 1.0]"), ["give [first x, last x, number of places]"]),
         (LIMIT + MOVING.format("[0.05, 0.15, 2]") + 'blocks = "x"\n', ["blocks does not go with positions"]),
-        (LIMIT + MOVING.format("[0.05, 0.15, 2]") * 2, ["only one load may move, and loads 1 does"]),
+        (
+            LIMIT + MOVING.format("[0.05, 0.15, 2]") + MOVING.format("[0.05, 0.15, 3]"),
+            ["[loads 2] positions: loads that move do so together", "the first of them has 2, this one 3"],
+        ),
         (LIMIT + SIDEWAYS + '[control]\nblock = "block 1"\n', ['[control] belongs to [analysis] kind = "pushover"']),
         (LIMIT + "capacity_at = [0.1]\n" + SIDEWAYS, ["capacity_at asks for limit loads", "along a [settlement]"]),
         (LIMIT + "displacement = 0.1\n" + SIDEWAYS, ["displacement is that of a limit load after a settlement"]),

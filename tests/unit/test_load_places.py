@@ -1,5 +1,7 @@
 """A force with a point acts on the block that holds it."""
 
+import json
+
 import numpy as np
 import pytest
 from structures import box, drawn, rectangle
@@ -45,6 +47,26 @@ def test_the_sum_is_the_force_however_many_blocks_are_named(tmp_path):
 def test_a_point_far_outside_the_one_block_that_is_named_is_told(tmp_path):
     with pytest.warns(UserWarning, match=r"point \(0.3, 50\) lies 49\.\d m outside block 'brick 4-2'.*is it in m"):
         loads_of(tmp_path, 'blocks = "brick 4-2"\npoint = [0.3, 50]')
+
+
+def test_axles_move_together_and_are_told_by_the_first(tmp_path):
+    """A block that overhangs its ground, and tips about x = 0 as its weight says, 0.25 m behind that edge."""
+    blocks = [
+        {"name": "ground", "role": "fixed", "outline": [[-1.5, -0.5], [0, -0.5], [0, 0], [-1.5, 0]]},
+        {"name": "block", "density": 2000, "outline": [[-1.5, 0], [1, 0], [1, 0.5], [-1.5, 0.5]]},
+    ]
+    (tmp_path / "a.json").write_text(json.dumps({"unit": "m", "blocks": blocks}), encoding="utf-8")
+    axle = '[[loads]]\nkind = "live"\nforce = [0, {}]\npositions = {}\n'
+    axles = axle.format(-1000, [0.2, 0.6, 3]) + axle.format(-500, [0.5, 0.9, 3])
+    case = tmp_path / "a.toml"
+    case.write_text(f'[geometry]\nfile = "a.json"\n[analysis]\nkind = "limit load"\n{axles}', encoding="utf-8")
+    found = blockvis.run_case(case, tmp_path / "out", outputs=()).response
+    x, weight = np.array([0.2, 0.4, 0.6]), 2000 * 1.25 * solver.GRAVITY
+    by_hand = 0.25 * weight / (1000 * x + 500 * (x + 0.3))
+    assert [limit.multiplier for limit in found.limits] == pytest.approx(by_hand, rel=1e-9)
+    assert [increment.parameter for increment in found.path] == pytest.approx(x)
+    # Read again the lowest place has all of them.
+    assert blockvis.open_results(tmp_path / "out").loads.live.sum(axis=0)[1] == pytest.approx(-1500.0)
 
 
 def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):

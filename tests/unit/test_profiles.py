@@ -288,6 +288,26 @@ def test_a_profile_that_names_no_support_says_which_there_are(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("motion", "reaction", "is_work"),
+    [
+        ("direction = [0, -1]", 19620.0, False),
+        ("direction = [0, -1]\nrotation_centre = [3, 0]\nrotation = -0.2", 7848.0, True),
+        ("profile = { supports = { base = [0, -1, 0.1] } }", 19620.0, True),
+    ],
+)
+def test_where_supports_turn_as_they_sink_the_reaction_is_told_as_work(tmp_path, capsys, motion, reaction, is_work):
+    base, column = ([[x, z], [-x, z], [-x, z - h], [x, z - h]] for x, z, h in ((-1, 0, 0.5), (-0.25, 2, 2)))
+    blocks = [{"name": "base", "role": "moving", "outline": base}, {"name": "column", "outline": column}]
+    (tmp_path / "a.json").write_text(json.dumps({"blocks": blocks}), encoding="utf-8")
+    case = f'[geometry]\nfile = "a.json"\n[settlement]\n{motion}\nlimit = 0.01\n'
+    (tmp_path / "a.toml").write_text(case, encoding="utf-8")
+    assert run_command(tmp_path / "a.toml", "-o", tmp_path / "out") == 0
+    out = capsys.readouterr().out
+    assert float(out.split("first reaction")[1].split()[0]) == pytest.approx(reaction, rel=1e-4)
+    assert ("reactions are the work on the supports over s" in out) == is_work
+
+
 def test_a_profile_that_moves_a_fixed_support_says_how_to_let_it_move():
     with pytest.raises(ValueError, match="'ground left' is fixed; give it the role \"moving\""):
         assembly_of(case_of(PORTAL, '{ supports = { "ground left" = [0, -1] } }'))

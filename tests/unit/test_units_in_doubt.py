@@ -76,6 +76,7 @@ COLUMN = '[geometry]\nlayout = "column"\n'
         ),
         ("[material]\ndensity = 2.0", "density 2 kg/m³ is lighter than masonry; if it is in t/m³, give 2000 kg/m³"),
         ("[material]\ndensity = 20", "density 20 kg/m³ is lighter than masonry; if it is in kN/m³, give 2039 kg/m³"),
+        ("thickness = 300", r"\[geometry\] thickness = 300 m is deeper than any wall .* is in mm, give 0.3 m"),
         (
             "[settlement]\ndirection = [0, -1]\nincrement = 5\nlimit = 100",
             "increment = 5 m is .* times the size of the median block, .* m: is it in mm\\? 0.005 m",
