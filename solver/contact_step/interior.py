@@ -72,10 +72,8 @@ class _Iterate:
         self.size = max(p.size, 1e-5, -float(p.gap.min()))
         mean = 0.03 * self.size
         # The start lies well inside limits and cones.
-        before = p.forces[:, 0]
-        normal = np.maximum(before, 0.3)
-        opening = np.maximum(p.gap, mean / normal)
-        normal = np.where(before > 0.0, normal, np.minimum(normal, mean / opening))
+        # Whatever is left of a force where blocks have parted, its product with the gap would be that of all others.
+        normal = np.maximum(p.forces[:, 0], mean / np.maximum(p.gap, mean / 0.3))
         self.normal = np.minimum(normal, 0.5 * p.most)
         self.yielding = mean / self.reserve
         self.yielding[len(upper) :] = np.maximum(self.yielding[len(upper) :], p.gap[lower])
