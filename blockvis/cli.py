@@ -631,7 +631,8 @@ def _sweep(options: argparse.Namespace) -> int:
         )
         return INTERRUPTED
     print(in_words(read_json(folder / "summary.json")))
-    print(f"table and pictures in {folder}/")
+    pictures = " and pictures" if any(folder.glob("*.png")) else ""
+    print(f"table{pictures} in {folder}/")
     return 0
 
 

@@ -199,7 +199,8 @@ def _roles(table: Table) -> dict[str, str]:
     for name, role in roles.items():
         if role not in mechanics.ROLES:
             one_of = ", ".join(mechanics.ROLES)
-            raise ValueError(f'{table.source}: [roles] "{name}" is {shortened(role)}; a role is {one_of}')
+            places = f", or by place: {', '.join(PLACES)}" if isinstance(role, dict) else ""
+            raise ValueError(f'{table.source}: [roles] "{name}" is {shortened(role)}; a role is {one_of}{places}')
     return roles
 
 

@@ -85,10 +85,11 @@ def case_assembly(case: Case) -> solver.Assembly:
         raise ValueError(f"{drawing}{error}{remedy and f'; {remedy}'}") from None
     _refuse_unknown_materials(case, assembly)
     if case.settlements and not assembly.moving.any():
-        groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
+        groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports})
+        held = [name for name, free in zip(assembly.names, assembly.free, strict=True) if not free]
         raise ValueError(
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
-            f"[[supports]]: {', '.join(groups)}"
+            f"[[supports]]: {listed(groups or held or assembly.names, 12)}"
         )
     check_coordinates(case, assembly)
     _note_numbers(assembly, case.source)

@@ -108,9 +108,9 @@ class Table:
         entries = [value] if isinstance(value, Mapping) else value
         if not isinstance(entries, list):
             raise self.error(key, f"must be [[{key}]] tables, not {value!r}")
-        return [
-            Table(entry, f"{key} {i + 1}" if len(entries) > 1 else key, self.source) for i, entry in enumerate(entries)
-        ]
+        where = f"{self.where}.{key}" if self.where else key
+        several = len(entries) > 1
+        return [Table(entry, f"{where} {i + 1}" if several else where, self.source) for i, entry in enumerate(entries)]
 
     def error(self, key: str, problem: str) -> ValueError:
         """Make an error that names the file, the table and the key."""

@@ -60,6 +60,12 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
         piece = _touching_bodies(points, every)
         if piece is not None:
             return _pieces(part, points, every, piece)
+        # One that is drawn twice, or turned inside out, is closed by its own points all the same.
+        apart = _pieces(part, part.points, part.faces, _connected(part))
+        if len(apart) > 1 and all(
+            (np.unique(sides_of(of.faces), axis=0, return_counts=True)[1] == 2).all() for of in apart
+        ):
+            return [body for of in apart for body in closed_bodies(of, size)]
     holes = unique[counts == 1]
     closed = _with_holes_closed(points, faces, holes) if len(holes) and counts.max() == 2 else None
     if closed is not None:
@@ -77,12 +83,19 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
         raise ValueError(
             f"body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
             f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
-            "export one file or one named object per block (.obj, .glb, .step)"
+            "export one file or one named object per block (.obj, .glb, .step), none of them twice or inside out"
         )
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
     edge = inverse.ravel().reshape(-1, 3)
     piece = linked(edge[:, [0, 0]].ravel(), edge[:, [1, 2]].ravel(), len(unique))[edge[:, 0]]
     return _pieces(part, points, _seen_from_outside(points, faces, edge, piece), piece, holes)
+
+
+def _connected(part: Body) -> np.ndarray:
+    """(m,) int array: the piece of each face, of those that share points of the file."""
+    faces = part.faces
+    of_points = linked(faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel(), len(part.points))
+    return np.unique(of_points[faces[:, 0]], return_inverse=True)[1].ravel()
 
 
 def _with_holes_closed(

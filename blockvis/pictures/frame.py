@@ -135,7 +135,7 @@ class Sheet:
         [m], and the picture ``beside`` that of :attr:`beside`.
         """
         beside_title = self._room(badge) >= _font(round(1.15 * self.text), bold=True).getlength(title)
-        titles, font = self._titles(title, badge if beside_title else "", several=not badge)
+        titles, font = self._titles(title, badge if beside_title else "")
         shared = tuple(keys), pixel, detail, badge, beside_title, len(titles)
         if shared != self._page_of:
             # One at a time: joints open and slide now and then, and a page at any size is memory.
@@ -161,9 +161,9 @@ class Sheet:
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
         # Two rows below the title.
-        room = [self._room("")] * 2
-        if not beside_title:
-            room[-1] = self._room(badge)
+        below = "" if beside_title else badge
+        # A warning below two rows of a title stands beside both of these.
+        room = [self._room(below if titles > 1 else ""), self._room(below)]
         rows, font = fitting_rows(detail, round(SMALL * self.text), room)
         top, step = DETAIL[titles - 1]
         for row, words in enumerate(rows):
@@ -173,10 +173,10 @@ class Sheet:
             self._badge(draw, badge, self.pad + 2.55 * self.text * (not beside_title))
         return page
 
-    def _titles(self, title: str, badge: str, *, several: bool) -> tuple[list[str], ImageFont.FreeTypeFont]:
+    def _titles(self, title: str, badge: str) -> tuple[list[str], ImageFont.FreeTypeFont]:
         """Rows of a title and their font: several where in one its letters were smaller than those below it."""
         font = fitting_font(title, round(1.15 * self.text), self._room(badge), bold=True)
-        if several and font.size < round(SMALL * self.text):
+        if font.size < round(SMALL * self.text):
             return fitting_rows(title, self.text, [self._room("")] * len(TITLE), bold=True)
         return [title], font
 

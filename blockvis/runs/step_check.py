@@ -97,6 +97,8 @@ class StepCheck:
         """What there is to say where the difference matters; nothing where it does not."""
         if self.error <= NOTABLE and self.stop == self.stop_of_check:
             return ""
+        if self.error <= NOTABLE and self.stop_of_check == solver.Status.SOLVER_FAILED:
+            return "shorter steps came to a program that is not solved: half the step_tolerance may lead past it"
         return (
             f"the steps matter by more than {100.0 * NOTABLE:g} %: take a smaller step_tolerance; where that changes "
             "nothing, as where stones slip off each other, a wall may have several paths"

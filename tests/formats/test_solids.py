@@ -109,12 +109,16 @@ def test_stones_of_one_mesh_that_touch_are_separate_blocks(tmp_path, name, suffi
         np.testing.assert_allclose(np.sort(found.shapes.volumes), np.sort(layout.shapes.volumes), rtol=1e-4)
 
 
-def test_touching_bodies_of_which_one_is_turned_inside_out_are_refused(tmp_path):
+def test_touching_bodies_of_which_one_is_inside_out_or_drawn_twice_are_told_apart_by_their_own_points(tmp_path):
     pair = [trimesh.creation.box((1, 1, 1), transform=move((k, 0, 0))) for k in (0, 1)]
     pair[1].faces = pair[1].faces[:, ::-1]
     trimesh.util.concatenate(pair).export(tmp_path / "a.stl")
-    with pytest.raises(ValueError, match=r"holds bodies that touch and cannot be told apart: 4 edges .* per block"):
+    with pytest.raises(ValueError, match=r"holds bodies that touch and cannot be told apart: 4 edges .* inside out"):
         read(tmp_path / "a.stl")
+    trimesh.util.concatenate([*pair, pair[0]]).export(tmp_path / "a.ply")
+    found = read(tmp_path / "a.ply", dimension=3)
+    np.testing.assert_allclose(found.shapes.volumes, [1.0, 1.0])
+    assert found.names == ("a.ply 1", "a.ply 2")
 
 
 def glb(path, nodes, roots=None):

@@ -74,7 +74,9 @@ def test_springers_of_a_vault_are_found_in_space(tmp_path):
         ("below = { }", "[roles] below names no coordinate; write below = { z = 0.1 }"),
         ("box = { x = [1.0, 0.0] }", "[roles] box: x is [1.0, 0.0]; give two numbers, the smaller first"),
         ("touching = { x = 'left' }", "[roles] touching: x is 'left'; give a number, in m"),
-        ("below = { y = 0.9, role = 'ground' }", "role is 'ground'"),
+        ("below = { y = 0.9, role = 'ground' }", "[roles.below] role is 'ground'"),
+        ("beneath = { y = 0.9 }", "a role is free, fixed, moving, or by place: below, touching, box"),
+        ("box = { x = [2.0, 3.0], y = [0, 1] }", 'role "moving" under [roles] or add [[supports]]: block 2'),
         ("below = { h = 0.9 }", "h is not a key here"),
     ],
 )
