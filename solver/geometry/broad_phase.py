@@ -24,14 +24,13 @@ def box_pairs(vertices: np.ndarray, offsets: np.ndarray, reach: float | np.ndarr
     for axis in range(low.shape[1]):
         order = np.argsort(low[:, axis], kind="stable")
         ends = np.searchsorted(low[order, axis], high[order, axis], side="right")
-        sweeps.append((order, np.maximum(ends - np.arange(1, len(order) + 1), 0), axis))
-    order, counts, swept = min(sweeps, key=lambda sweep: int(sweep[1].sum()))
+        sweeps.append((order, np.maximum(ends - np.arange(1, len(order) + 1), 0)))
+    order, counts = min(sweeps, key=lambda sweep: int(sweep[1].sum()))
     owner, position = expand_ranges(counts)
     i, j = order[owner], order[owner + 1 + position]
     for axis in range(low.shape[1]):
-        if axis != swept:
-            touching = (low[i, axis] <= high[j, axis]) & (low[j, axis] <= high[i, axis])
-            i, j = i[touching], j[touching]
+        touching = (low[i, axis] <= high[j, axis]) & (low[j, axis] <= high[i, axis])
+        i, j = i[touching], j[touching]
     return np.minimum(i, j), np.maximum(i, j)
 
 

@@ -12,7 +12,7 @@ from .convex_parts import ENDS, PlacedParts
 from .facing import SMALLEST_SINE
 from .outlines import next_vertices
 from .portions import alike
-from .solids import cross, dot, unit
+from .solids import cross, dot, stacked, taken, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
 
 
@@ -26,10 +26,9 @@ class ClippedCorners(NamedTuple):
 
 
 def clipped_faces(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:
-    """Corners of the polygons in which faces a and faces b, (n,) int arrays, cover each other."""
+    """Corners of the polygons in which faces a and faces b, (n,) int arrays of one or more, cover each other."""
     offsets = placed.solids.face_offsets
-    none, no_area = np.zeros((0, 4), dtype=np.int64), np.zeros(0)
-    clipped = [ClippedCorners(none[:, 0], none, no_area, no_area)]
+    clipped = []
     for k, corner_a, corner_b in alike((offsets, face_a), (offsets, face_b)):
         corners = _clipped(placed, face_a[k], face_b[k], corner_a, corner_b)
         clipped.append(corners._replace(owner=k[corners.owner]))
@@ -45,13 +44,13 @@ def _clipped(
     # polygon runs from its corner k to the next, which for a is the edge that starts at the latter.
     corner_a = corner_a[:, ::-1]
     edge_a, edge_b = np.roll(corner_a, -1, axis=1), corner_b
-    normal = unit(faces.normals[face_b] - faces.normals[face_a])
-    x = faces.tangents[face_b]
+    normal = unit(taken(faces.normals, face_b) - taken(faces.normals, face_a))
+    x = taken(faces.tangents, face_b)
     x = unit(x - dot(x, normal)[:, None] * normal)
     y = cross(normal, x)
     origin = faces.middles[face_b][:, None]
     a, b = (
-        np.stack([dot(arms, x[:, None]), dot(arms, y[:, None])], axis=-1)
+        stacked([dot(arms, x[:, None]), dot(arms, y[:, None])])
         for arms in (placed.starts(corner) - origin for corner in (corner_a, corner_b))
     )
     along_a, along_b = np.roll(a, -1, axis=1) - a, np.roll(b, -1, axis=1) - b
@@ -162,10 +161,8 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     ring = arms[order]
     after = ring[following]
     triangle = (ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]) / 2.0
-    shares = np.zeros(len(owner))
     # Half of the triangle before and half of the one behind.
-    np.add.at(shares, order, triangle / 2.0)
-    np.add.at(shares, order[following], triangle / 2.0)
+    shares = sum(np.bincount(corner, triangle / 2.0, len(owner)) for corner in (order, order[following]))
     area = np.bincount(owner, shares, minlength=count)
     far = np.zeros(count)
     np.maximum.at(far, owner, np.hypot(arms[:, 0], arms[:, 1]))

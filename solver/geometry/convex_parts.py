@@ -16,7 +16,7 @@ from solver.words import Kept, kept
 from .contacts import frames_of
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike, linked
-from .solids import ROUNDING, Faces, Solids, cross, dot, unit
+from .solids import ROUNDING, Faces, Solids, cross, dot, taken, unit
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -109,7 +109,7 @@ class PlacedParts:
 
     def starts(self, edges: np.ndarray) -> np.ndarray:
         """(..., 3) array [m]: corners at which edges start."""
-        return self.vertices[self.solids.corners[edges]]
+        return taken(self.vertices, self.solids.corners[edges])
 
     def along(self, edges: np.ndarray) -> np.ndarray:
         """(..., 3) array [m]: from the starts of edges to their ends."""
@@ -119,23 +119,23 @@ class PlacedParts:
         """(n, n_faces) array [m]: how far corners, (n, n_corners) int, are at least before faces, (n, n_faces) int."""
         # From a corner near by, for the digits of coordinates far from the origin.
         origin = self.vertices[self.solids.offsets[self.solids.block_of_face[face[:, :1]]]]
-        normals, corners = self.faces.normals[face], self.vertices[corner] - origin
+        normals, corners = taken(self.faces.normals, face), taken(self.vertices, corner) - origin
         heights = dot(normals[:, :, None], corners[:, None]).min(axis=2)
-        return heights - dot(normals, self.faces.middles[face] - origin)
+        return heights - dot(normals, taken(self.faces.middles, face) - origin)
 
     def kinds_at(self, edges: np.ndarray, points: np.ndarray) -> np.ndarray:
         """(n,) array: kinds of edges where points (n, 3) [m] are along them, the larger at the end of two pieces."""
         along = self.along(edges)
         place = dot(points - self.starts(edges), along) / dot(along, along)
         place = np.clip(place, 2.0 * CORNER_TOLERANCE, 1.0 - 2.0 * CORNER_TOLERANCE)[:, None]
-        first, last, kind = np.moveaxis(self.parts.pieces[edges], -1, 0)
+        first, last, kind = np.moveaxis(self.parts.pieces.take(edges, axis=0), -1, 0)
         here = (first - CORNER_TOLERANCE <= place) & (place <= last + CORNER_TOLERANCE)
         return np.where(here, kind, INSIDE).max(axis=1)
 
     def outward(self, edges: np.ndarray) -> np.ndarray:
         """(..., 3) array: sum of the outward normals of the two faces at each edge."""
         face = self.solids.face_of_corner
-        return self.faces.normals[face[edges]] + self.faces.normals[face[self.solids.twins[edges]]]
+        return taken(self.faces.normals, face[edges]) + taken(self.faces.normals, face[self.solids.twins[edges]])
 
 
 class NoParts(ValueError):
@@ -191,7 +191,7 @@ def _out_of_faces(solids: Solids) -> np.ndarray:
     """(n,) array [m]: how far a corner of each solid is in front of one of its own faces."""
     faces = solids.faces(solids.vertices)
     every, out = np.arange(len(solids)), np.zeros(len(solids))
-    for k, face, vertex in alike((solids.faces_of_block, every), (solids.offsets, every)):
+    for k, face, vertex in alike((solids.faces_of_block, every), (solids.offsets, every), filled=True):
         corner = solids.vertices[vertex]
         distance = dot(faces.normals[face][:, :, None], corner[:, None] - faces.middles[face][:, :, None])
         out[k] = distance.max(axis=(1, 2))

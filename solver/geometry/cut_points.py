@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .broad_phase import expand_ranges
 from .clipping import corner_areas
 from .contacts import Contacts
 from .convex_parts import ConvexParts
+from .portions import alike
+from .solids import taken
 
 #: Points are on a line where the angle between others is this near to a half turn.
 STRAIGHT = 1e-3
@@ -41,19 +42,14 @@ def without_points_of_cuts(
     places = np.einsum("ni,nki->nk", contacts.points[chosen] - origin, frame[:, 1:])
 
     # The widest angle at each point without another point elsewhere.
-    owner, position = expand_ranges(counts[group_of])
-    arms_to = places[start[group_of][owner] + position] - places[owner]
-    elsewhere = np.abs(arms_to).max(axis=1) > near
-    owner, angles = owner[elsewhere], np.arctan2(arms_to[elsewhere, 1], arms_to[elsewhere, 0])
-    order = np.lexsort((angles, owner))
-    owner, angles = owner[order], angles[order]
-    lowest, highest = np.full(len(chosen), np.pi), np.full(len(chosen), -np.pi)
-    np.minimum.at(lowest, owner, angles)
-    np.maximum.at(highest, owner, angles)
-    widest = lowest - highest + 2.0 * np.pi
-    next_to = np.flatnonzero(np.diff(owner) == 0)
-    np.maximum.at(widest, owner[next_to], np.diff(angles)[next_to])
-    between = widest <= np.pi + STRAIGHT
+    between = np.zeros(len(chosen), dtype=bool)
+    for k, others in alike((np.append(start, len(chosen)), group_of), filled=True):
+        arms = taken(places, others) - taken(places, k)[:, None]
+        elsewhere, angles = np.abs(arms).max(axis=2) > near, np.arctan2(arms[..., 1], arms[..., 0])
+        lowest = np.where(elsewhere, angles, np.pi).min(axis=1)[:, None]
+        angles = np.sort(np.where(elsewhere, angles, lowest), axis=1)
+        widest = np.diff(angles, append=lowest + 2.0 * np.pi, axis=1).max(axis=1)
+        between[k] = widest <= np.pi + STRAIGHT
 
     # Each place once, though several parts have a corner there.
     spans = ~between

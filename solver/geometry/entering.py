@@ -18,11 +18,8 @@ BEFORE = 10.0
 AS_DEEP = 0.5
 
 
-class Movement(NamedTuple):
-    """Convex parts before and after a movement."""
-
-    before: PlacedParts
-    after: PlacedParts
+#: Convex parts before and after a movement.
+Movement = tuple[PlacedParts, PlacedParts]
 
 
 class _Axes(NamedTuple):
@@ -32,16 +29,12 @@ class _Axes(NamedTuple):
     second: np.ndarray
     before: np.ndarray  #: [m], separation along it
     after: np.ndarray  #: [m], after the movement by its plane, which rides on one of the parts
-    apart: np.ndarray  #: [m], largest separation after the movement along any axis of this kind
 
 
-def entered(
-    movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, deepest: np.ndarray
-) -> tuple[np.ndarray, ...]:
-    """Find parts that overlap by more than a tolerance [m] after a movement, and what would keep them apart.
+def entered(movement: Movement, i: np.ndarray, j: np.ndarray, deepest: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Find what would keep apart parts i and j, (n_pairs,) int arrays, that overlap after a movement.
 
-    Parts i and j, (n_pairs,) int arrays, are near each other after it. Overlaps before it beyond the ``deepest``,
-    (n_pairs,) [m], are those of axes of no contact.
+    Overlaps before it beyond the ``deepest``, (n_pairs,) [m], are those of axes of no contact.
 
     Gives corners and the faces before which they are to stay, (n,) int; edges of parts i and of parts j that are to
     stay before each other, (m,) int; numbers of such edges and corners of parts i that have come behind the plane
@@ -51,27 +44,23 @@ def entered(
     separated them before, and ride on one of them, the one is taken behind which the other has come least. A movement
     in which no corner comes behind it cannot end in an overlap.
     """
-    kinds: list[_Axes] = []
-    for axes_of in (_of_faces, lambda m, one, other: _of_faces(m, other, one), _of_edges):
-        axes = axes_of(movement, i, j)
-        deep = axes.apart < -tolerance
-        i, j, deepest = i[deep], j[deep], deepest[deep]
-        kinds = [_Axes(*(value[deep] for value in kind)) for kind in [*kinds, axes]]
+    placed, placed_after = movement
+    kinds = [_of_faces(movement, i, j), _of_faces(movement, j, i), _of_edges(movement, i, j)]
     best = np.argmax([_score(kind.before, kind.after) for kind in kinds], axis=0)
     before = np.choose(best, [kind.before for kind in kinds])
     best = np.where(before < -deepest, len(kinds), best)
     corners, faces = [], []
     for number, others in ((0, j), (1, i)):
         k = np.flatnonzero(best == number)
-        face, planes = kinds[number].first[k], movement.after.faces
+        face, planes = kinds[number].first[k], placed_after.faces
         points, normals = planes.middles[face], planes.normals[face]
-        owner, corner = _behind(movement.after, others[k], points, normals, kinds[number].after[k])
+        owner, corner = _behind(placed_after, others[k], points, normals, kinds[number].after[k])
         corners.append(corner)
         faces.append(face[owner])
     k = np.flatnonzero(best == 2)
     own, other = kinds[2].first[k], kinds[2].second[k]
-    normals = _ridden(movement, across(movement.before, own, other), other)
-    at_edges, edge_corner = _behind(movement.after, i[k], movement.after.starts(other), normals, kinds[2].after[k])
+    normals = _ridden(movement, across(placed, own, other), other)
+    at_edges, edge_corner = _behind(placed_after, i[k], placed_after.starts(other), normals, kinds[2].after[k])
     return np.concatenate(corners), np.concatenate(faces), own, other, at_edges, edge_corner
 
 
@@ -102,40 +91,37 @@ def _behind(
 
 def _of_faces(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     """Give the axes along normals of faces of parts i, with parts j before them."""
-    solids = movement.before.solids
-    before, after, apart = np.empty((3, len(i)))
+    solids = movement[0].solids
+    before, after = np.empty((2, len(i)))
     first = np.empty(len(i), dtype=np.int64)
-    for k, face, corner in alike((solids.faces_of_block, i), (solids.offsets, j)):
+    for k, face, corner in alike((solids.faces_of_block, i), (solids.offsets, j), filled=True):
         gaps = [placed.before_faces(face, corner) for placed in movement]
         best, row = _score(*gaps).argmax(axis=1), np.arange(len(k))
         first[k], before[k], after[k] = face[row, best], gaps[0][row, best], gaps[1][row, best]
-        apart[k] = gaps[1].max(axis=1)
-    return _Axes(first, first, before, after, apart)
+    return _Axes(first, first, before, after)
 
 
 def _of_edges(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     """Give the axes across an edge of parts i and one of parts j, on which their planes ride."""
     placed_before, placed_after = movement
     offsets, (once, edges_of) = placed_before.solids.offsets, placed_before.solids.whole_edges
-    before, after, apart = np.full((3, len(i)), -np.inf)
+    before, after = np.full((2, len(i)), -np.inf)
     first, second = np.zeros((2, len(i)), dtype=np.int64)
-    for k, own, other, *corners in alike((edges_of, i), (edges_of, j), (offsets, i), (offsets, j)):
+    for k, own, other, *corners in alike((edges_of, i), (edges_of, j), (offsets, i), (offsets, j), filled=True):
         own, other = np.repeat(once[own], other.shape[1], axis=1), np.tile(once[other], (1, own.shape[1]))
         normals = across(placed_before, own, other)
         gaps, foremost = _gaps(placed_before, normals, own, other, corners)
         ridden, _ = _gaps(placed_after, _ridden(movement, normals, other), own, other, corners)
-        new, _ = _gaps(placed_after, across(placed_after, own, other), own, other, corners)
         best, row = np.where(foremost, _score(gaps, ridden), -np.inf).argmax(axis=1), np.arange(len(k))
         before[k] = np.where(foremost[row, best], gaps[row, best], -np.inf)
         first[k], second[k], after[k] = own[row, best], other[row, best], ridden[row, best]
-        apart[k] = new.max(axis=1)
-    return _Axes(first, second, before, after, apart)
+    return _Axes(first, second, before, after)
 
 
 def _ridden(movement: Movement, normals: np.ndarray, other: np.ndarray) -> np.ndarray:
     """(..., 3) array: normals that ride on the parts of edges, after the movement."""
     after = np.zeros_like(normals)
-    face = movement.before.solids.face_of_corner[other]
+    face = movement[0].solids.face_of_corner[other]
     axes = ((unit(placed.along(other)), placed.faces.normals[face]) for placed in movement)
     for old, new in zip(*((along, normal, cross(along, normal)) for along, normal in axes), strict=True):
         after += dot(normals, old)[..., None] * new

@@ -12,7 +12,7 @@ from solver.words import kept
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import STEEPEST_LANDING, Contacts, are_known
 from .outlines import Bodies, next_vertices, overlap_depths, polygon_integrals
-from .solids import dot
+from .solids import dot, stacked, taken
 
 #: Sine of the angle by which the flanks of a corner may tilt into the edge it faces, as those of an open joint.
 LARGEST_TILT = 0.5
@@ -78,6 +78,23 @@ class Polygons(Bodies):
         return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
 
     @kept
+    def side_of_edge(self) -> np.ndarray:
+        """(n_vertices,) int array: first edge of the side that each edge is a part of.
+
+        A straight or slightly re-entrant corner, which has no contact point of its own, does not end a side.
+        """
+        first, last = self.offsets[:-1], self.offsets[1:] - 1
+        along = _unit(self.vertices[self.next_vertex] - self.vertices)
+        before = along[self.previous_vertex]
+        turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
+        ends = self.convex_vertex | (turn < -LARGEST_TILT) | (dot(before, along) < 0.0)
+        number = np.arange(len(ends))
+        side = np.maximum.accumulate(np.where(ends, number, first[self.block_of_vertex]))
+        # The side at the first corner may begin before it.
+        wraps = ~ends[side]
+        return np.where(wraps, side[last][self.block_of_vertex], side)
+
+    @kept
     def widths(self) -> np.ndarray:
         """(n,) array [m]: twice the area over the perimeter of each polygon, near b for a long a × b."""
         return 2.0 * self.areas / np.add.reduceat(self.edge_lengths, self.offsets[:-1])
@@ -97,11 +114,7 @@ class Polygons(Bodies):
         return float(np.sqrt(self.areas[chosen].mean()))
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-        """Find the points at which blocks touch or may touch within one increment, with gaps up to ``reach`` [m].
-
-        Where the corners, (n_vertices, 2) [m], now are. One of two blocks that touch must be of the ``useful``,
-        (n_blocks,) bool, those that are free to move. Sorted by their features, so that the same geometry gives the
-        same order.
+        """Find the points of :func:`~solver.mechanics.find_contacts`, of two blocks one ``useful``, (n_blocks,) bool.
 
         Candidates are all pairs of a convex corner and an edge of another block, not both of supports, with the
         corner in front of the edge (gap at most ``reach``), its block on the outward side and above the edge over
@@ -202,7 +215,7 @@ def _areas(shapes: Polygons, contacts: Contacts) -> np.ndarray:
     however it has turned.
     """
     vertex, edge, corner = corners_and_edges(contacts.features)
-    over, side = np.stack([vertex, shapes.previous_vertex[vertex]], axis=1), _side_of_edge(shapes)
+    over, side = np.stack([vertex, shapes.previous_vertex[vertex]], axis=1), shapes.side_of_edge
     on_corner = corner >= 0
     over[on_corner] = _facing_edge(shapes, vertex[on_corner], edge[on_corner], corner[on_corner])[:, None]
     low, high = np.sort([side[over], np.broadcast_to(side[edge][:, None], over.shape)], axis=0).astype(np.int64)
@@ -222,23 +235,6 @@ def _areas(shapes: Polygons, contacts: Contacts) -> np.ndarray:
     length = (np.bincount(corner_of, length) / np.bincount(corner_of))[corner_of]
     thickness = np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
     return length.reshape(-1, 2).sum(axis=1) * thickness
-
-
-def _side_of_edge(shapes: Polygons) -> np.ndarray:
-    """(n_vertices,) int array: first edge of the side that each edge is a part of.
-
-    A straight or slightly re-entrant corner, which has no contact point of its own, does not end a side.
-    """
-    first, last = shapes.offsets[:-1], shapes.offsets[1:] - 1
-    along = _unit(shapes.vertices[shapes.next_vertex] - shapes.vertices)
-    before = along[shapes.previous_vertex]
-    turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
-    ends = shapes.convex_vertex | (turn < -LARGEST_TILT) | (dot(before, along) < 0.0)
-    number = np.arange(len(ends))
-    side = np.maximum.accumulate(np.where(ends, number, first[shapes.block_of_vertex]))
-    # The side at the first corner may begin before it.
-    wraps = ~ends[side]
-    return np.where(wraps, side[last][shapes.block_of_vertex], side)
 
 
 def _passed_edges(
@@ -281,10 +277,9 @@ def _vertex_edge_candidates(
     low, high = boxes(vertices, offsets)
     owner, position = expand_ranges(counts[pair_a])
     vertex, b = offsets[pair_a][owner] + position, pair_b[owner]
+    place = taken(vertices, vertex)
     near = shapes.convex_vertex[vertex]
-    for axis in (0, 1):
-        place = vertices[vertex, axis]
-        near &= (place >= (low[:, axis] - reach)[b]) & (place <= (high[:, axis] + reach)[b])
+    near &= ((place >= taken(low - reach, b)) & (place <= taken(high + reach, b))).all(axis=1)
     vertex, b = vertex[near], b[near]
 
     owner, position = expand_ranges(counts[b])
@@ -292,13 +287,12 @@ def _vertex_edge_candidates(
     # The distance comes first, as most pairs are far from each other.
     length, width = shapes.edge_lengths, shapes.widths
     tangents = (vertices[following] - vertices) / length[:, None]
-    normals = np.stack([tangents[:, 1], -tangents[:, 0]], axis=1)
-    gap = dot(vertices[vertex] - vertices[edge], normals[edge])
+    normals = stacked([tangents[:, 1], -tangents[:, 0]])
+    gap = dot(taken(vertices, vertex) - taken(vertices, edge), taken(normals, edge))
     near = np.flatnonzero((gap >= -PENETRATION_FRACTION * width.max()) & (gap <= reach))
     vertex, edge, gap = vertex[near], edge[near], gap[near]
-    along = dot(vertices[vertex] - vertices[edge], tangents[edge])
-    a_block, b_block = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
-    deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
+    along = dot(taken(vertices, vertex) - taken(vertices, edge), taken(tangents, edge))
+    deepest = PENETRATION_FRACTION * width[shapes.block_of_vertex[[vertex, edge]]].min(axis=0)
     end = end_zone(shapes, vertex, edge)
     # Past a re-entrant corner is still the block.
     before, behind = (np.where(shapes.convex_vertex[corner], end, deepest) for corner in (edge, following[edge]))
@@ -307,7 +301,7 @@ def _vertex_edge_candidates(
     vertex, edge = vertex[chosen], edge[chosen]
 
     to_next, to_previous = _flanks(shapes, vertices, vertex)
-    normal = normals[edge]
+    normal = taken(normals, edge)
     outside = (dot(to_next, normal) >= -LARGEST_TILT) & (dot(to_previous, normal) >= -LARGEST_TILT)
     outside &= dot(_inward(to_next, to_previous), normal) > 0.0
     return vertex[outside], edge[outside]
@@ -347,15 +341,15 @@ def _seen_from_edges(
     shapes: Polygons, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions of edges, (n, 2), and how far corners are along and before them, (n,) arrays [m]."""
-    tangent = _unit(vertices[shapes.next_vertex[edge]] - vertices[edge])
-    offset = vertices[vertex] - vertices[edge]
+    start = taken(vertices, edge)
+    tangent, offset = _unit(taken(vertices, shapes.next_vertex[edge]) - start), taken(vertices, vertex) - start
     return tangent, dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
 
 
 def _flanks(shapes: Polygons, vertices: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Give the unit vectors from corners to the next and to the previous corner, (n, 2) arrays."""
-    to_next = vertices[shapes.next_vertex[vertex]] - vertices[vertex]
-    to_previous = vertices[shapes.previous_vertex[vertex]] - vertices[vertex]
+    here = taken(vertices, vertex)
+    to_next, to_previous = (taken(vertices, to[vertex]) - here for to in (shapes.next_vertex, shapes.previous_vertex))
     return _unit(to_next), _unit(to_previous)
 
 

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain
 
 import numpy as np
 
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from solver.words import kept
 
-from .broad_phase import box_pairs, expand_ranges
+from .broad_phase import expand_ranges
 from .clipping import clipped_faces
 from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
 from .convex_parts import ENDS, GOES_ON, ConvexParts, PlacedParts, convex_parts
 from .cut_points import without_points_of_cuts
-from .entering import Movement, across, entered
-from .facing import FacingParts, edge_separations, face_separations, facing_parts, near_parts
-from .portions import linked
-from .solids import ROUNDING, Solids, cross, dot, unit
-from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
+from .entering import across, entered
+from .facing import FacingParts, edge_separations, facing_parts, overlapping_parts
+from .portions import alike, linked
+from .solids import ROUNDING, Solids, cross, dot, taken, unit
+from .spatial_features import ACROSS, BEFORE_EDGE, ON_FACE, feature_rows, places_of, read_places
 
 #: Difference of separations, in widths, that is more than rounding.
 SAME_PLACE = 1e-4
@@ -48,11 +46,7 @@ class Polyhedra(Solids):
         return np.asarray(np.trace(self.inertia, axis1=1, axis2=2) / (3.0 * self.volumes))
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-        """Find the points at which blocks touch or may touch within one increment, with gaps up to ``reach`` [m].
-
-        Where the corners, (n_vertices, 3) [m], now are. One of two blocks that touch must be of the ``useful``,
-        (n_blocks,) bool, those that are free to move. Sorted by their features, so that the same geometry gives the
-        same order.
+        """Find the points of :func:`~solver.mechanics.find_contacts`, of two blocks one ``useful``, (n_blocks,) bool.
 
         Of two near parts, the face from which the other part is farthest leads, and the face of the other that opposes
         it best answers. Both are projected into the plane half-way between and clipped. A corner of the clipped polygon
@@ -70,31 +64,31 @@ class Polyhedra(Solids):
 
         shallow = pairs.apart >= -PENETRATION_FRACTION * pairs.width
         # Flanks of steep tips hardly face each other.
-        numbers = np.flatnonzero(shallow & (pairs.cosine <= -0.05))
-        facing, every, nearest = pairs[numbers], np.arange(len(numbers)), np.full(len(pairs.i), np.inf)
+        numbers = np.flatnonzero(shallow & (dot(*placed.faces.normals[pairs.faces]) <= -0.05))
+        facing, nearest = pairs[numbers], np.full(len(pairs.part), np.inf)
         # With each point the planes of both faces, and whether it is near.
         found: list[Contacts] = []
         labels: list[np.ndarray] = []
         at_cut = np.bincount(solids.face_of_corner, parts.goes_on) > 0
-        resolved, largest = np.zeros(len(every), dtype=bool), np.zeros(len(every))
+        resolved, largest = np.zeros(len(numbers), dtype=bool), np.zeros(len(numbers))
         # What lies along an edge of a cut stands on the face that goes on there, and no other answers.
-        on_cut = resolved if parts.whole else _edges_over(placed, facing, reach)[1]
-        _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
+        goes_on = (parts.pieces[..., 2] == GOES_ON).any(axis=1)
+        on_cut = np.logical_or.reduceat(goes_on, solids.face_offsets[:-1])[facing.leading]
+        on_cut[on_cut] = _edges_over(placed, facing[on_cut], reach)[1] if on_cut.any() else False
+        _, joint = np.unique(block_of_part[facing.parts].T @ [len(widths), 1], return_inverse=True)
         # Other faces are tried where those that oppose each other best do not cover each other.
-        for pair, face_i, face_j in chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed)):
-            unresolved = ~resolved[pair]
-            pair, face_i, face_j = pair[unresolved], face_i[unresolved], face_j[unresolved]
-            corners = clipped_faces(placed, face_i, face_j)
+        for pair, faces in facing.faces_in_turn(placed, resolved):
+            corners = clipped_faces(placed, *faces)
             contacts = _measured(placed, corners.features, corners.areas)
             lowest = np.full(len(pair), np.inf)
             np.minimum.at(lowest, corners.owner, contacts.gaps)
             nearest[numbers[pair]] = np.minimum(nearest[numbers[pair]], lowest)
-            strip = corners.widths / np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
+            strip = corners.widths / solids.face_widths[faces].min(axis=0)[corners.owner]
             # What overlaps on a strip at a large gap slides past before it would touch.
             slides_past = (strip < 0.5) & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
             area = np.bincount(corners.owner, corners.areas, minlength=len(pair))
             np.maximum.at(largest, joint[pair], area)
-            small = (area < SLIVER * largest[joint[pair]]) & (at_cut[face_i] | at_cut[face_j])
+            small = (area < SLIVER * largest[joint[pair]]) & at_cut[faces].any(axis=0)
             sliver = small[corners.owner] & (strip < SLIVER)
             # Edges that cross behind a plane that separates their parts do not touch.
             owner = pair[corners.owner]
@@ -102,14 +96,14 @@ class Polyhedra(Solids):
             inside = near(contacts)
             # What touches along a line alone has no area.
             contacts = replace(contacts, areas=(np.bincount(corners.owner, inside) > 2)[corners.owner] * contacts.areas)
-            resolved = resolved | on_cut | (np.bincount(owner[kept & inside], minlength=len(every)) > 0)
+            resolved |= on_cut | (np.bincount(owner[kept & inside], minlength=len(numbers)) > 0)
             kept = np.flatnonzero(kept if not parts.whole else kept & inside)
             found.append(contacts[kept])
-            owner = corners.owner[kept]
-            labels.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
+            labels.append(np.stack([*parts.plane[faces[:, corners.owner[kept]]], inside[kept]], axis=1))
         # Where a plane separates parts and points of both are as near as that, no tips or edges touch.
         others = (pairs.apart < -SAME_PLACE * pairs.width) | (nearest > pairs.apart + SAME_PLACE * pairs.width)
-        beside = shallow & (others | _rests_on_more(placed, pairs))
+        beside, resting = shallow & others, np.flatnonzero(shallow & ~others)
+        beside[resting] = _rests_on_more(placed, pairs[resting])
         over, crossed = _edges_over(placed, pairs[beside], reach)[0], _crossed_edges(placed, pairs[others], reach)
         single = _measured(placed, np.vstack([over, crossed]))
         beyond = [placed.kinds_at(edge, single.points) != ENDS for edge in single.features.T[1:3]]
@@ -131,42 +125,30 @@ class Polyhedra(Solids):
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than a tolerance [m], (n,) int, the lower first, and their depths [m].
 
-        A depth is the smallest movement that separates their deepest two parts. Convex parts are separated by a face of
-        one of them or by two edges across each other: the largest separation of these, negative, is the depth.
+        A depth is the smallest movement that separates their deepest two parts.
         """
-        placed, block_of_part = self.parts.placed(vertices), self.parts.block_of_part
-        i, j = box_pairs(placed.vertices, placed.solids.offsets, -tolerance)
-        other = block_of_part[i] != block_of_part[j]
-        i, j = i[other], j[other]
-        none = np.zeros(len(placed.solids.block_of_face), dtype=bool)
-        apart = np.full(len(i), -np.inf)
-        by_faces, by_edges = partial(face_separations, inner=none), partial(edge_separations, smallest_sine=ROUNDING)
-        for of in (by_faces, by_faces, by_edges):
-            apart = np.maximum(apart, of(placed, i, j)[0])
-            deep = apart < -tolerance
-            i, j, apart = j[deep], i[deep], apart[deep]
-        blocks = np.sort(np.stack([block_of_part[i], block_of_part[j]], axis=1), axis=1)
+        every = np.ones(len(self), dtype=bool)
+        i, j, _, of_parts = overlapping_parts(self.parts.placed(vertices), tolerance, every, self.widths)
+        blocks = self.parts.block_of_part[np.stack([i, j], axis=1)]
         pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)
         depth = np.zeros(len(pairs))
-        np.maximum.at(depth, pair_of.ravel(), -apart)
+        np.maximum.at(depth, pair_of.ravel(), of_parts)
         return pairs[:, 0], pairs[:, 1], depth
 
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
     ) -> Contacts:
-        """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
+        """Find the points of ``Polygons.entered`` in space.
 
-        Of corners (n_vertices, 3) [m] before and after, of overlaps of more than the tolerance [m] with ``useful``
-        blocks, (n_blocks,) bool, those beside known contacts. Edges touch where they cross; where that is known and
-        does not help, as one turns, corners are to stay before the plane that separated the two.
+        Edges touch where they cross; where that is known and does not help, as one turns, corners are to stay before
+        the plane that separated the two.
         """
-        placed = self.parts.placed(before)
-        movement = Movement(placed, self.parts.placed(after))
-        i, j, width = near_parts(movement.after, -tolerance, useful, self.widths)
-        deepest = PENETRATION_FRACTION * width
-        face_corner, face, own, other, pair, corner = entered(movement, i, j, tolerance, deepest)
+        placed, placed_after = self.parts.placed(before), self.parts.placed(after)
+        i, j, width, _ = overlapping_parts(placed_after, tolerance, useful, self.widths)
+        found = entered((placed, placed_after), i, j, PENETRATION_FRACTION * width)
+        face_corner, face, own, other, pair, corner = found
         on_face = _measured(placed, feature_rows(ON_FACE, face_corner, face, -1))
-        crossings = places_of(*_crossings(movement.after, own, other))
+        crossings = places_of(*_crossings(placed_after, own, other))
         crossed = _measured(placed, feature_rows(ACROSS, own, other, crossings))
         _, known = matched_contacts(crossed, contacts)
         corner, pair = corner[known[pair]], pair[known[pair]]
@@ -209,6 +191,11 @@ def _measured(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | Non
     face_normals, face_tangents = normals.copy(), tangents.copy()
     along = np.zeros_like(normals)
 
+    # A corner on a corner, or edges that are nearly parallel.
+    k = np.flatnonzero(~on_face)
+    x_b[k] = placed.starts(second[k])
+    normals[k] = unit(face_normals[k] - faces.normals[face_of[first[k]]])
+
     # A corner on the boundary of a face.
     k = np.flatnonzero(on_face & (rest >= 0))
     own, other = rest[k] % len(corners), rest[k] // len(corners)
@@ -226,13 +213,8 @@ def _measured(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | Non
     x_b[k] = placed.starts(other) + on_b[:, None] * edge_b
     crossing = unit(cross(edge_a, edge_b))
     sense = np.sign(dot(crossing, placed.outward(other) - placed.outward(own)))
-    halfway = unit(face_normals[k] - faces.normals[face_of[own]])
-    normals[k] = np.where(parallel[:, None], halfway, sense[:, None] * crossing)
+    normals[k] = np.where(parallel[:, None], normals[k], sense[:, None] * crossing)
     along[k] = np.where(parallel[:, None], 0.0, unit(edge_b))
-
-    k = np.flatnonzero(kind == ON_CORNER)
-    x_b[k] = placed.starts(second[k])
-    normals[k] = unit(face_normals[k] - faces.normals[face_of[first[k]]])
 
     # Rotated about the edge; where there is none, projected onto the plane of the contact.
     has_edge = dot(along, along) > 0.0
@@ -276,9 +258,9 @@ def _rests_on_more(placed: PlacedParts, pairs: FacingParts) -> np.ndarray:
     """(n,) bool array: where a part has corners as near to the leading face as any that its answering face lacks."""
     offsets, faces, tolerance = placed.solids.offsets, placed.faces, SAME_PLACE * pairs.width
     owner, position = expand_ranges(np.diff(offsets)[pairs.part])
-    corner = placed.vertices[offsets[pairs.part][owner] + position]
+    corner = taken(placed.vertices, offsets[pairs.part][owner] + position)
     both = (pairs.leading[owner], pairs.answering[owner])
-    before, behind = (dot(corner - faces.middles[face], faces.normals[face]) for face in both)
+    before, behind = (dot(corner - taken(faces.middles, face), taken(faces.normals, face)) for face in both)
     more = (before <= (pairs.apart + tolerance)[owner]) & (behind < -tolerance[owner])
     return np.bincount(owner, more, minlength=len(pairs.part)) > 0
 
@@ -289,15 +271,29 @@ def _edges_over(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[
     And of which pairs an edge lies along a boundary beyond which the face of the block goes on, (n,) bool.
     """
     solids, faces, (once, first) = placed.solids, placed.faces, placed.solids.whole_edges
-    owner, position = expand_ranges(np.diff(first)[pairs.part])
-    edge, face = once[first[pairs.part][owner] + position], pairs.leading[owner]
+    may_stand = np.zeros(len(pairs.part), dtype=bool)
+    for k, corner, vertex in alike((solids.face_offsets, pairs.leading), (solids.offsets, pairs.part), filled=True):
+        face, normals = pairs.leading[k], taken(faces.normals, pairs.leading[k])[:, None]
+        inward = cross(normals, unit(placed.along(corner)))
+        inside = dot(taken(placed.vertices, vertex)[:, None] - placed.starts(corner)[:, :, None], inward[:, :, None])
+        arms = taken(placed.vertices, vertex) - taken(faces.middles, face)[:, None]
+        gaps, smallest = dot(arms, normals), CORNER_TOLERANCE * solids.shortest_edges[face, None]
+        over = (inside.min(axis=1) > smallest) & (gaps <= reach)
+        # An edge that lands inside a boundary is, at its middle and so at one of its ends, half as far inside, less
+        # what its gap asks for twice over.
+        lands = (inside - gaps[:, None] / (2.0 * STEEPEST_LANDING)).max(axis=2) > smallest / 2.0
+        goes_on = (placed.parts.pieces[corner, :, 2] == GOES_ON).any(axis=2)
+        may_stand[k] = (lands | goes_on).all(axis=1) | over.any(axis=1)
+    number, part = np.flatnonzero(may_stand), pairs.part[may_stand]
+    owner, position = expand_ranges(np.diff(first)[part])
+    edge, face, owner = once[first[part][owner] + position], pairs.leading[number[owner]], number[owner]
     ends = np.stack([edge, solids.next_corner[edge]])
-    gaps = dot(placed.starts(ends) - faces.middles[face], faces.normals[face])
+    gaps = dot(placed.starts(ends) - taken(faces.middles, face), taken(faces.normals, face))
     near = gaps.min(axis=0) <= reach
     pair, edge, face, ends, gaps = owner[near], edge[near], face[near], ends[:, near], gaps[:, near]
     owner, position = expand_ranges(np.diff(solids.face_offsets)[face])
     corner, starts = solids.face_offsets[face][owner] + position, np.flatnonzero(position == 0)
-    inward = cross(faces.normals[face[owner]], unit(placed.along(corner)))
+    inward = cross(taken(faces.normals, face[owner]), unit(placed.along(corner)))
     inside = dot(placed.starts(ends[:, owner]) - placed.starts(corner), inward)
     smallest = CORNER_TOLERANCE * solids.shortest_edges[face]
     on_boundary = np.abs(inside).max(axis=0) <= smallest[owner]
@@ -329,7 +325,13 @@ def _edges_over(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[
 
 def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
     """Features of edges that separate two parts better than any of their faces: one point for a pair."""
-    apart, own, other = edge_separations(placed, pairs.i, pairs.j)
+    offsets, nearest = placed.solids.offsets, np.empty(len(pairs.part))
+    for k, one, other in alike(*((offsets, part) for part in pairs.parts), filled=True):
+        arms = taken(placed.vertices, one)[:, :, None] - taken(placed.vertices, other)[:, None]
+        nearest[k] = np.sqrt(dot(arms, arms).min(axis=(1, 2)))
+    # No plane separates parts farther than two of their corners are apart; half of it is left to rounding.
+    pairs = pairs[nearest > pairs.apart + SAME_PLACE / 2.0 * pairs.width]
+    apart, own, other = edge_separations(placed, *pairs.parts)
     k = np.flatnonzero((apart > pairs.apart + SAME_PLACE * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
     on_a, on_b = _crossings(placed, own, other)

@@ -8,11 +8,13 @@ from math import prod
 import numpy as np
 
 #: Arrays of no more than so many numbers are worked on at a time.
-PORTION = 2_000_000
+PORTION = 100_000
 
 
-def alike(*groups: tuple[np.ndarray, np.ndarray]) -> Iterator[tuple[np.ndarray, ...]]:
+def alike(*groups: tuple[np.ndarray, np.ndarray], filled: bool = False) -> Iterator[tuple[np.ndarray, ...]]:
     """Numbers of the items whose owners have as many members each, in portions, and these members.
+
+    Or of those which have no more than twice as many as others, ``filled`` up with the last member of each.
 
     Of each group owner ``i`` has the members from entry ``i`` to entry ``i + 1`` of the first, (n_owners + 1,) int, and
     item ``k`` the owner in entry ``k`` of the second, (n,) int. Yields items, (m,) int, and for each group their
@@ -21,16 +23,17 @@ def alike(*groups: tuple[np.ndarray, np.ndarray]) -> Iterator[tuple[np.ndarray, 
     counts = [np.diff(offsets)[owner] for offsets, owner in groups]
     keys = np.zeros(len(counts[0]), dtype=np.int64)
     for count in counts:
-        keys = keys * (int(count.max(initial=0)) + 1) + count
+        keys = keys * (int(count.max(initial=0)) + 1) + (np.frexp(count)[1] if filled else count)
     order = np.argsort(keys, kind="stable")
     for same in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
         if len(same):
-            sizes = [int(count[same[0]]) for count in counts]
+            sizes = [int(count[same].max()) for count in counts]
             portion = max(1, PORTION // max(1, prod(sizes)))
             for items in np.split(same, np.arange(portion, len(same), portion)):
+                # Items come next to each other in memory: numpy is fast along the longest axis alone.
                 members = (
-                    offsets[owner[items]][:, None] + np.arange(size)
-                    for (offsets, owner), size in zip(groups, sizes, strict=True)
+                    (offsets[owner[items]] + np.minimum(np.arange(size)[:, None], count[items] - 1)).T
+                    for (offsets, owner), size, count in zip(groups, sizes, counts, strict=True)
                 )
                 yield items, *members
 

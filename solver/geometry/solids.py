@@ -17,16 +17,28 @@ from .outlines import Bodies, next_vertices
 ROUNDING = 1e-6
 
 
-def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(..., 3) array: cross products, a coordinate at a time, which is faster than ``np.cross``."""
-    a, b = first, second
-    return np.stack([a[..., i] * b[..., j] - a[..., j] * b[..., i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
+    return stacked([a[..., i] * b[..., j] - a[..., j] * b[..., i] for i, j in ((1, 2), (2, 0), (0, 1))])
 
 
 def dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(...) array: dot products along the last axis, coordinate by coordinate: its sum takes ten times as long."""
-    products = [first[..., k] * second[..., k] for k in range(first.shape[-1])]
-    return sum(products[1:], products[0])
+    total = first[..., 0] * second[..., 0]
+    for k in range(1, first.shape[-1]):
+        total += first[..., k] * second[..., k]
+    return total
+
+
+def stacked(coordinates: Sequence[np.ndarray]) -> np.ndarray:
+    """(..., d) array: vectors by their coordinates, each of which stays together in memory: numpy is fast along it."""
+    together = np.concatenate([coordinate[None] for coordinate in coordinates])
+    return together.transpose(*range(1, together.ndim), 0)
+
+
+def taken(vectors: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """(..., d) array: vectors, (n, d), of these numbers, with each coordinate together in memory."""
+    return vectors.T.take(numbers.T, axis=-1).T
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -123,19 +135,24 @@ class Solids(Bodies):
         """(n_faces,) array [m]: length of the shortest edge of each face."""
         return np.minimum.reduceat(self.edge_lengths, self.face_offsets[:-1])
 
+    @kept
+    def longest_edges(self) -> np.ndarray:
+        """(n_faces,) int array: the longest edge of each face, the first of equal ones."""
+        order = np.lexsort((-np.arange(len(self.corners)), self.edge_lengths, self.face_of_corner))
+        return order[self.face_offsets[1:] - 1]
+
     def faces(self, vertices: np.ndarray) -> Faces:
         """Planes of the faces where the corners now are, (n_vertices, 3) [m]."""
         starts, counts = self.face_offsets[:-1], np.diff(self.face_offsets)
         points = vertices[self.corners]
         arms = points - np.repeat(points[starts], counts, axis=0)
         areas = np.add.reduceat(cross(arms, arms[self.next_corner]), starts) / 2.0
-        order = np.lexsort((-np.arange(len(self.corners)), self.edge_lengths, self.face_of_corner))
-        longest = order[self.face_offsets[1:] - 1]
         normals = unit(areas)
-        along = points[self.next_corner[longest]] - points[longest]
+        along = points[self.next_corner[self.longest_edges]] - points[self.longest_edges]
         along = along - dot(along, normals)[:, None] * normals
         middles = points[starts] + np.add.reduceat(arms, starts) / counts[:, None]
-        return Faces(normals, unit(along), middles, np.sqrt(dot(areas, areas)))
+        normals, along, middles = map(np.asfortranarray, (normals, unit(along), middles))
+        return Faces(normals, along, middles, np.sqrt(dot(areas, areas)))
 
     @kept
     def face_widths(self) -> np.ndarray:

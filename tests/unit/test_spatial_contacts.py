@@ -348,6 +348,22 @@ def test_contact_points_do_not_depend_on_how_corners_are_numbered(bonded):
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
 
 
+@pytest.mark.slow
+def test_contact_points_do_not_depend_on_which_pairs_are_worked_on_together(monkeypatch):
+    """Stones with other numbers of corners stand in one array, filled up; one by one nothing is filled."""
+    vault = generators.cross_vault(voussoirs=3, stone=1.2)
+    random, middles = np.random.default_rng(7), vault.centroids[vault.polyhedra.block_of_vertex]
+    turns = np.array([turn_by(vector) for vector in random.normal(0.0, 0.02, (vault.n_blocks, 3))])
+    arms = vault.vertices - middles
+    moved = middles + np.einsum("nij,nj->ni", turns[vault.polyhedra.block_of_vertex], arms)
+    together = mechanics.find_contacts(vault, moved, 0.1)
+    monkeypatch.setattr("solver.geometry.portions.PORTION", 1)
+    one_by_one = mechanics.find_contacts(vault, moved, 0.1)
+    assert set(together.features[:, 0]) == {0, 2}, "corners in faces, and edges across each other"
+    for name in ("features", "points", "frames", "gaps", "slip", "areas"):
+        np.testing.assert_array_equal(getattr(one_by_one, name), getattr(together, name))
+
+
 def about_z(turn):
     """Rows turned about the vertical axis."""
     return turn_by([0.0, 0.0, turn]).T
