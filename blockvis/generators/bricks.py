@@ -45,19 +45,13 @@ def cut_bricks(
     block.
     """
     height, grid = bond.brick_height, GRID * bond.brick_height
-    boxes = coursed(bond.kind, width, courses * height, (bond.brick_length, height), 0)
-    kept = [(shape, round(shape.bounds[1] / height)) for shape in shapely.set_precision(boxes, grid)]
-    for ring in rings:
-        hole = shapely.Polygon(ring)
-        shapely.prepare(hole)
-        pieces: list[tuple[shapely.Polygon, int]] = []
-        for shape, course in kept:
-            if not hole.intersects(shape):
-                pieces.append((shape, course))
-                continue
-            rest = shapely.set_precision(shape.difference(hole), grid)
-            pieces += [(part, course) for part in pieces_of(rest)]
-        kept = pieces
+    boxes = shapely.set_precision(coursed(bond.kind, width, courses * height, (bond.brick_length, height), 0), grid)
+    holes = shapely.union_all([shapely.Polygon(ring) for ring in rings])
+    met = shapely.intersects(boxes, holes)
+    cut = np.where(met, shapely.set_precision(shapely.difference(boxes, holes), grid), boxes)
+    kept = [
+        (part, round(box.bounds[1] / height)) for box, rest in zip(boxes, cut, strict=True) for part in pieces_of(rest)
+    ]
     whole = without_slivers([shape for shape, _ in kept], lambda shape, _: _is_sliver(bond, shape), height, grid)
     laid = sorted(((shape, kept[piece][1]) for shape, piece in whole), key=lambda one: (one[1], one[0].bounds[:2]))
     outlines = [without_collinear(shapely.get_coordinates(shape)[:-1], 1e-9) for shape, _ in laid]

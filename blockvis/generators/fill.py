@@ -391,11 +391,10 @@ def _laid(
         is_complete += [part.area > (1.0 - 1e-6) * unit.area for part in parts]
     if random:
         pieces = bedded(pieces, rest)
-
-    def too_small(shape: shapely.Polygon, piece: int) -> bool:
-        return not is_complete[piece] and _is_sliver(shape, length, height)
-
-    return _numbered([shape for shape, _ in without_slivers(pieces, too_small, height, grid)], pattern)
+    joined = without_slivers(
+        pieces, lambda shape, piece: not is_complete[piece] and _is_sliver(shape, length, height), height, grid
+    )
+    return _numbered([shape for shape, _ in joined], pattern)
 
 
 def _numbered(joined: Sequence[shapely.Polygon], pattern: Pattern) -> list[tuple[str, shapely.Polygon]]:
@@ -438,12 +437,9 @@ def _with_crumbs(
 ) -> list[tuple[str, shapely.Polygon]]:
     """Join what is left between heads and openings, a crumb of a brick, to a head or quoin; drop dust."""
     length, height = pattern.module
-    every = [*laid, *others]
-
-    def is_crumb(shape: shapely.Polygon, piece: int) -> bool:
-        return piece < len(laid) and shape.area < CRUMB * length * height
-
-    joined = without_slivers([shape for _, shape in every], is_crumb, height, grid)
+    every, crumb = [*laid, *others], CRUMB * length * height
+    shapes = [shape for _, shape in every]
+    joined = without_slivers(shapes, lambda shape, piece: piece < len(laid) and shape.area < crumb, height, grid)
     return [(every[piece][0], shape) for shape, piece in joined if shape.area > DUST * length * height]
 
 
