@@ -12,7 +12,7 @@ import shapely
 
 import solver
 from blockvis.layout.names import blocks_matching
-from blockvis.layout.outlines import ROUNDING, ring_of
+from blockvis.layout.outlines import ROUNDING, ring_of, uncovered
 from blockvis.text import listed
 
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
@@ -189,13 +189,9 @@ def _segments(
             left, _, right, _ = cover.bounds or (0.0, 0.0, 0.0, 0.0)
             if cover.area > small * max(right - left, small):
                 hidden.append((left, right))
-        at = float(stop[e, 0])
-        seen = []
-        for left, right in [*sorted(hidden), (float(start[e, 0]), np.inf)]:
-            if left - at > small:
-                seen.append((at, left))
-            at = max(at, right)
-        for left, right in seen:
+        for left, right in uncovered(float(stop[e, 0]), float(start[e, 0]), hidden):
+            if right - left <= small:
+                continue
             parts = (np.array([[right], [left]]) - start[e, 0]) / (stop[e, 0] - start[e, 0])
             pieces.append(start[e] + parts * (stop[e] - start[e]))
             block.append(int(owner[e]))

@@ -19,7 +19,7 @@ from .assemble import as_simplified
 from .facing import facing_tolerance
 from .inspect import Inspection
 from .layout import Layout
-from .outlines import ROUNDING, largest_piece, pieces_of, rectangle, ring_of, touching, without_collinear
+from .outlines import ROUNDING, largest_piece, pieces_of, rectangle, ring_of, touching, uncovered, without_collinear
 from .repair import repaired
 from .solids import size_of
 
@@ -164,7 +164,10 @@ def _laid(found: Inspection) -> Ground:
         is_level = np.ptp([foot.level for foot in beds]) < 1e-3 * depth
         supports = _slab(found, beds, split, depth) if is_level and not springers else _pads(found, beds, split)
     elif beds:
-        supports = _bedded(_drawn_and_closed(found, outlines), feet, split, depth, _opening(found))
+        # With joints closed, and as drawn: there a stone may reach lower.
+        both = zip(outlines, _as_simplified(found), _standing(found, outlines), strict=True)
+        standing = [ring for closed, drawn, stands in both if stands for ring in (closed, drawn)]
+        supports = _bedded(standing, feet, split, depth, _opening(found))
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
     here = f"the ground below it {said if split.axis else 'stands on the left and settles on the right'}"
@@ -175,12 +178,6 @@ def _laid(found: Inspection) -> Ground:
         )
     settles = mechanics.MOVING in [*roles.values(), *(support["role"] for support in supports)]
     return Ground(f"The drawing has no supports: here {here}.", roles, tuple(supports), settles)
-
-
-def _drawn_and_closed(found: Inspection, outlines: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """(n, 2) arrays: blocks that stand, with their joints closed and as drawn: there a stone may reach lower."""
-    both = zip(outlines, _as_simplified(found), _standing(found, outlines), strict=True)
-    return [ring for closed, drawn, stands in both if stands for ring in (closed, drawn)]
 
 
 def _on_a_level(found: Inspection) -> _Foot:
@@ -211,7 +208,8 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
         if low[k, 1] > low[order[0], 1] + COURSE * height and not arch:
             break
         edges = _lower_edges(outlines[k])
-        steep = _slope(edges, float(high[k, 0] - low[k, 0])) > (LEVEL if arch else SLOPE)
+        run, rise = np.abs(edges[-1] - edges[0]).tolist()
+        steep = run <= NARROW * (high[k, 0] - low[k, 0]) or rise > (LEVEL if arch else SLOPE) * run
         lower = [j for j in beside[k] if low[j, 1] < low[k, 1]]
         if steep and springers.intersection(lower):
             # It rests on a springer, or on a voussoir that does.
@@ -289,12 +287,6 @@ def _lower_edges(points: np.ndarray) -> np.ndarray:
     return chain[gentle[0] : gentle[-1] + 2] if len(gentle) else chain[[chain[:, 1].argmin()]]
 
 
-def _slope(bed: np.ndarray, width: float) -> float:
-    """Slope of a bed from end to end, infinite for a point or an edge."""
-    run, rise = np.abs(bed[-1] - bed[0]).tolist()
-    return rise / run if run > NARROW * width else np.inf
-
-
 def _beneath(bed: np.ndarray, shapes: np.ndarray) -> list[tuple[float, float]]:
     """Find the intervals of x of what lies beneath a bed, as the toes of stones that themselves lie higher."""
     if len(bed) < 2:
@@ -308,12 +300,7 @@ def _beneath(bed: np.ndarray, shapes: np.ndarray) -> list[tuple[float, float]]:
 def _widest_free(bed: np.ndarray, taken: Iterable[tuple[float, float]]) -> np.ndarray | None:
     """Cut the widest part of a bed that no interval of x takes; None where less is left than a foot needs."""
     start, end = float(bed[0, 0]), float(bed[-1, 0])
-    free, reached = [], start
-    for low, high in sorted(taken):
-        free.append((reached, min(float(low), end)))
-        reached = max(reached, float(high))
-    free.append((reached, end))
-    left, right = max(free, key=lambda part: part[1] - part[0])
+    left, right = max(uncovered(start, end, taken), key=lambda part: part[1] - part[0], default=(start, start))
     if right - left < EXPOSED * (end - start) or right <= left:
         return None
     inner = bed[(bed[:, 0] > left) & (bed[:, 0] < right)]
@@ -398,12 +385,6 @@ def _above(ring: np.ndarray, level: float) -> shapely.Geometry:
     return shapely.union_all(shapely.convex_hull(shapely.multipoints(np.concatenate([ends, raised], axis=1))))
 
 
-def _bed(points: np.ndarray, level: float, least: float) -> np.ndarray | None:
-    """(n, 2) array: hull in plan of the corners of a block within ``level`` of its lowest; None of less area [m²]."""
-    face = shapely.MultiPoint(points[points[:, 2] <= points[:, 2].min() + level][:, :2]).convex_hull
-    return shapely.get_coordinates(face)[:-1] if face.area > least else None
-
-
 def _feet_in_space(found: Inspection) -> list[_Foot]:
     """Find the blocks of the lowest course in space, and the bottom faces they lie on in plan."""
     blocks = found.kept.tolist()
@@ -422,7 +403,9 @@ def _feet_in_space(found: Inspection) -> list[_Foot]:
         covered = plans[k].intersection(shapely.union_all(plans[lower])).area if lower else 0.0
         if covered > (1.0 - EXPOSED) * plans[k].area:
             continue
-        bed = _bed(corners[k], LEVEL * height[k], NARROW * plans[k].area)
+        flat = corners[k][corners[k][:, 2] <= low[k, 2] + LEVEL * height[k]]
+        face = shapely.MultiPoint(flat[:, :2]).convex_hull
+        bed = shapely.get_coordinates(face)[:-1] if face.area > NARROW * plans[k].area else None
         rests = (low[lower, 2] < low[k, 2] - 0.5 * near).any()
         # Without a bed it may rest on a springer.
         if bed is not None or not (rests or not _can_be_named(found, blocks[k])):
@@ -489,11 +472,8 @@ def _split(feet: Sequence[_Foot], opening: float) -> _Split:
     for axis in range(len(feet[0].low)):
         spans = sorted((float(foot.low[axis]), float(foot.high[axis])) for foot in feet)
         left, right = spans[0][0], max(end for _, end in spans)
-        middle, gaps, reached = 0.5 * (left + right), [], spans[0][1]
-        for start, end in spans[1:]:
-            if start > reached + opening:
-                gaps.append((reached, start))
-            reached = max(reached, end)
+        middle = 0.5 * (left + right)
+        gaps = [(start, end) for start, end in uncovered(left, right, spans) if end - start > opening]
         near = min(gaps, key=lambda gap: abs(0.5 * sum(gap) - middle), default=(middle, middle))
         # Of two gaps that are as wide but for rounding, or of none, the first axis has it.
         found.append((near[1] - near[0], right - left, _Split(axis, 0.5 * sum(near))))

@@ -83,7 +83,12 @@ def regions_of(
     walls = _walls_of(layout, drawn, free, choices)
     regions = [_nested([drawn[k] for k, n in walls.items() if n == number]) for number in range(len(choices))]
     every = [(region, number) for number, group in enumerate(regions) for region in group]
-    _take_out(every)
+    for region, number in every:
+        # Walls of other choices are none of the larger ones around them.
+        region.taken.extend(
+            other.wall for other, n in every
+            if n != number and other.wall.area < region.wall.area and share_in(other.wall, region.wall) > ROUNDING
+        )  # fmt: skip
     others = [k for k in free if k not in walls]
     opened = {k: _opened_by(drawn[k], every, choices, layout.source) for k in others}
     for k, around in opened.items():
@@ -92,22 +97,10 @@ def regions_of(
     left = [k for k in others if not opened[k] and drawn[k].block >= 0]
     notes = [*layout.notes, *_reaching_out(every), *_left_in(drawn, left, every)]
     used = [drawn[k] for k in (*walls, *filter(opened.get, others))]
-    return regions, replace(_without(layout, used), notes=tuple(notes))
-
-
-def _take_out(every: Sequence[tuple[Region, int]]) -> None:
-    """Take walls of other choices, by their number, out of the larger ones around them."""
-    for region, number in every:
-        region.taken.extend(
-            other.wall for other, n in every
-            if n != number and other.wall.area < region.wall.area and share_in(other.wall, region.wall) > ROUNDING
-        )  # fmt: skip
-
-
-def _without(layout: Layout, used: Sequence[_Drawn]) -> Layout:
     blocks, items = {one.block for one in used}, {one.item for one in used}
+    left_out = tuple(one for i, one in enumerate(layout.left_out) if i not in items)
     rest = layout.chosen([i for i in range(layout.n_blocks) if i not in blocks])
-    return replace(rest, left_out=tuple(one for i, one in enumerate(layout.left_out) if i not in items))
+    return regions, replace(rest, left_out=left_out, notes=tuple(notes))
 
 
 def _walls_of(
@@ -187,7 +180,12 @@ def _nested(drawn: Sequence[_Drawn]) -> list[Region]:
     """Walls among the outlines of one choice: those in an even number of others; those in an odd one are openings."""
     unlike: list[_Drawn] = []
     for one in sorted(drawn, key=lambda one: -one.shape.area):
-        twin = next((k for k, other in enumerate(unlike) if _is_same(one.shape, other.shape)), None)
+        alike = (
+            one.shape.intersects(other.shape)
+            and one.shape.symmetric_difference(other.shape).area < SAME * other.shape.area
+            for other in unlike
+        )
+        twin = next((k for k, same in enumerate(alike) if same), None)
         if twin is None:
             unlike.append(one)
         elif one.holes:
@@ -198,10 +196,6 @@ def _nested(drawn: Sequence[_Drawn]) -> list[Region]:
         one, openings = unlike[k], [unlike[hole].shape for hole in inner]
         regions.append(Region(one.shape, one.labels[0], one.labels[-1], openings=[*one.holes, *openings]))
     return regions
-
-
-def _is_same(one: Any, other: Any) -> bool:
-    return bool(one.symmetric_difference(other).area < SAME * other.area) if one.intersects(other) else False
 
 
 def _no_outline(layout: Layout, drawn: Sequence[_Drawn], key: str, pattern: str) -> str:

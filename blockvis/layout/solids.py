@@ -115,17 +115,13 @@ def between(first: ArrayLike, second: ArrayLike) -> Solid:
 def extruded(outline: ArrayLike, first: float, last: float) -> Solid:
     """Extrude an outline of the upright plane, (n, 2) array of x, z [m], along y between two places [m]."""
     ring = np.asarray(outline, dtype=float)
-
-    def at(y: float) -> np.ndarray:
-        return np.column_stack([ring[:, 0], np.full(len(ring), y), ring[:, 1]])
-
-    return between(at(first), at(last))
+    return between(*(np.insert(ring, 1, y, axis=1) for y in (first, last)))
 
 
 def prism(outline: ArrayLike, bottom: float, top: float) -> Solid:
     """Extrude an outline in plan, (n, 2) array of x, y [m], upwards between two levels [m]."""
     ring = np.asarray(outline, dtype=float)
-    return between(*(np.column_stack([ring, np.full(len(ring), z)]) for z in (bottom, top)))
+    return between(*(np.insert(ring, 2, z, axis=1) for z in (bottom, top)))
 
 
 def box(low: Sequence[float] | np.ndarray, high: Sequence[float] | np.ndarray) -> Solid:
