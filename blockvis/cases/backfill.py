@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -123,49 +124,37 @@ def lay_backfill(
             raise ValueError(f"{where} {key} is {value:g}; give a number {'of at least' if least == 0 else 'above'} 0")
     if not np.isfinite(surface):
         raise ValueError(f"{where} surface is {surface:g} m; give the height of its top, a finite number")
-    pieces, block = _extrados(assembly, _chosen(names, assembly, where), surface)
+    named = [blocks_matching(name, assembly, f"{where} over") for name in names]
+    chosen = assembly.free & np.isin(np.arange(assembly.n_blocks), [*chain(*named)])
+    if not chosen.any():
+        raise ValueError(f"{where} over: '{listed(names)}' are supports only; fill loads free blocks: name one")
+    d, small = assembly.dimension, ROUNDING * assembly.block_size
+    seen, owners = (_segments if d == 2 else _triangles)(assembly, chosen, surface, small)
+    pieces, block = np.array(seen, dtype=float).reshape(-1, d, d), np.array(owners, dtype=int)
     if not len(pieces):
         raise ValueError(f"{where} over: none of '{listed(names)}' looks up to the surface; name the topmost blocks")
-    bare = [f"'{name}'" for name in names if not np.isin(blocks_matching(name, assembly, where), block).any()]
+    bare = [f"'{name}'" for name, own in zip(names, named, strict=True) if not np.isin(own, block).any()]
     if bare:
         words = f"no fill lies on {listed(bare)}: no free block of that name looks up to the surface"
         warnings.warn(f"{where} over: {words}; name the topmost blocks", stacklevel=2)
     heights = pieces[:, :, -1].max(axis=1)
     highest = int(heights.argmax())
-    if heights[highest] > surface + ROUNDING * assembly.block_size:
+    if heights[highest] > surface + small:
         raise ValueError(
             f"{where} surface is {surface:g} m, below the extrados of block '{assembly.names[block[highest]]}', which "
             f"reaches {heights[highest]:.6g} m; raise it, or leave the block out of over"
         )
-    thickness = assembly.thickness[block] if assembly.dimension == 2 else None
+    thickness = assembly.thickness[block] if d == 2 else None
     return solver.Backfill(pieces, block, surface, unit_weight, pressure_coefficient, thickness)
-
-
-def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.ndarray:
-    """(n_blocks,) bool array: the free blocks of these names or materials."""
-    chosen = np.zeros(assembly.n_blocks, dtype=bool)
-    for pattern in over:
-        chosen[blocks_matching(pattern, assembly, f"{where} over")] = True
-    if not (chosen & assembly.free).any():
-        raise ValueError(f"{where} over: '{listed(over)}' are supports only; fill loads free blocks: name one")
-    return chosen & assembly.free
-
-
-def _extrados(assembly: solver.Assembly, chosen: np.ndarray, surface: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find the pieces of chosen blocks that look upwards and see a level surface [m], and the block of each.
-
-    They are (n, d, d) [m]: segments in the plane, triangles in space. What other blocks hide is left out; what stands
-    above the surface hides nothing.
-    """
-    small = ROUNDING * assembly.block_size
-    pieces, block = (_segments if assembly.dimension == 2 else _triangles)(assembly, chosen, surface, small)
-    d = assembly.dimension
-    return np.array(pieces, dtype=float).reshape(-1, d, d), np.array(block, dtype=int)
 
 
 def _segments(
     assembly: solver.Assembly, chosen: np.ndarray, surface: float, small: float
 ) -> tuple[list[np.ndarray], list[int]]:
+    """Find the segments (2, 2) [m] of chosen blocks that look upwards and see a level surface [m], and their blocks.
+
+    What other blocks hide is left out; what stands above the surface hides nothing.
+    """
     start, stop = assembly.vertices, assembly.vertices[assembly.polygons.next_vertex]
     owner = assembly.block_of_vertex
     edges = np.flatnonzero(chosen[owner] & (start[:, 0] - stop[:, 0] > small))
@@ -201,6 +190,7 @@ def _segments(
 def _triangles(
     assembly: solver.Assembly, chosen: np.ndarray, surface: float, small: float
 ) -> tuple[list[np.ndarray], list[int]]:
+    """Find triangles (3, 3) [m] in space, as :func:`_segments` finds segments in the plane."""
     shapes, solids = assembly.polyhedra, assembly.polyhedra.parts.solids
     faces = shapes.faces(shapes.vertices)
     chosen_faces = np.flatnonzero(chosen[shapes.block_of_face] & (faces.normals[:, 2] > ROUNDING))

@@ -93,7 +93,12 @@ def bonded(
         for region in regions:
             number += 1
             openings = [shapely.Polygon(one.exterior) for one in shapely.get_parts(shapely.union_all(region.openings))]
-            stones = _filled(region, openings, bonding.pattern, f"{where}: bond", mortar)
+            taken = shapely.union_all(region.taken) if region.taken else None
+            try:
+                stones = filled(region.wall, openings, bonding.pattern, taken, mortar=mortar)
+            except ValueError as error:
+                on = f" on layer '{region.layer}'" if region.layer else ""
+                raise ValueError(f"{where}: bond: the wall '{region.name}'{on}: {error}") from None
             names = [f"wall {number} {name}" if several else name for name in stones.names]
             notes += [
                 *(note for note in stones.notes if note not in notes),
@@ -103,15 +108,6 @@ def bonded(
             more = {key: [value] * stones.n_blocks for key, value in every.items() if value is not None}
             rest = rest.with_more(stones.blocks, names=names, materials=stones.materials, **more)
     return sorted_out(replace(rest, notes=tuple(notes)))
-
-
-def _filled(region: Region, openings: Sequence[shapely.Polygon], pattern: Pattern, where: str, mortar: bool) -> Layout:
-    taken = shapely.union_all(region.taken) if region.taken else None
-    try:
-        return filled(region.wall, openings, pattern, taken, mortar=mortar)
-    except ValueError as error:
-        on = f" on layer '{region.layer}'" if region.layer else ""
-        raise ValueError(f"{where}: the wall '{region.name}'{on}: {error}") from None
 
 
 def _told(region: Region, openings: int, stones: Layout, pattern: Pattern) -> Note:

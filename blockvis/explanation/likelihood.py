@@ -10,13 +10,13 @@ from scipy.special import logsumexp
 
 import solver
 from blockvis.cases.block_at import distances_to
+from blockvis.results.joint_faces import corners_of, on_faces
 from blockvis.results.joints import InitialJoints, carried_faces, initial_joints
 from solver import mechanics
 
 from .candidates import Candidate, Twin
 from .forward import COLLAPSE, Run, Variant, pose_of
 from .observations import Observations
-from .places import corners_of, on_faces
 
 #: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from the fraction
 #: of the largest on within which a collapse is found.

@@ -22,12 +22,12 @@ from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
 from blockvis.layout.names import blocks_called
+from blockvis.results.joint_faces import corners_of, on_faces
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, nearest, place_text
 from solver.mechanics import counted
 
 from .observation_keys import COLUMNS, LENGTHS, OBSERVATION
-from .places import corners_of, on_faces
 
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
 WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4

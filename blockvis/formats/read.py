@@ -23,11 +23,10 @@ from blockvis.layout.outlines import without_collinear
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.remedies import proposed_ignore
 from blockvis.layout.repair import DeepOverlap
-from blockvis.layout.selection import noted, sorted_out, without_ignored
+from blockvis.layout.selection import checked_window, noted, sorted_out, within_window, without_ignored
 from blockvis.layout.unfilled import walls_to_fill
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
-from blockvis.layout.window import checked_window, within_window
 from blockvis.system.atomic_files import atomic_file, write_atomic
 from solver import mechanics
 

@@ -11,8 +11,7 @@ import shapely
 
 from blockvis.layout.outlines import pieces_of, without_collinear
 
-from .bonds import SHORTEST_BRICK
-from .patterns import coursed
+from .patterns import SHORTEST_BRICK, coursed
 from .slivers import without_slivers
 
 #: All corners lie on a grid of this fraction of the brick height, so that cuts leave no slivers of rounding errors.

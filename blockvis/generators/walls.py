@@ -18,10 +18,10 @@ from solver.mechanics import counted
 
 from .arches import segmental_joints
 from .assembled import assembled
-from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, cut_bricks, places_in
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
+from .patterns import BONDS, SHORTEST_BRICK
 
 
 def wall(
