@@ -14,6 +14,7 @@ import shapely
 import solver
 from blockvis.layout.names import blocks_matching
 from blockvis.layout.outlines import ROUNDING, ring_of, uncovered
+from blockvis.layout.solids import plan_beyond
 from blockvis.text import listed
 
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
@@ -196,8 +197,8 @@ def _triangles(
     chosen_faces = np.flatnonzero(chosen[shapes.block_of_face] & (faces.normals[:, 2] > ROUNDING))
     plans = [shapes.vertices[shapes.corners[slice(*shapes.face_offsets[f : f + 2])]] for f in chosen_faces]
     seen = np.array([shapely.Polygon(plan[:, :2]) for plan in plans])
-    bodies = [solids.surface(k) for k in range(len(solids))]
-    footprints = np.array([shapely.MultiPoint(points[:, :2]).convex_hull for points, _ in bodies])
+    bodies = [solids.surface(k)[0] for k in range(len(solids))]
+    footprints = np.array([shapely.MultiPoint(points[:, :2]).convex_hull for points in bodies])
     low = np.minimum.reduceat(solids.vertices[:, 2], solids.offsets[:-1])
     face, part = shapely.STRtree(footprints).query(seen, predicate="intersects")
     touching = shapely.area(shapely.intersection(seen[face], footprints[part])) > small * assembly.block_size
@@ -208,9 +209,9 @@ def _triangles(
         for p in part[(face == k) & touching].tolist():
             if low[p] >= surface:
                 continue
-            cover = _above(bodies[p][0], bodies[p][1], normal, middle, small)
-            if cover is not None:
-                left = left.difference(cover)
+            height = (bodies[p] - middle) @ normal / normal[2]
+            if height.max() > small:
+                left = left.difference(plan_beyond(bodies[p], height, small))
         for polygon in shapely.get_parts(left):
             if polygon.area <= small * assembly.block_size:
                 continue
@@ -219,18 +220,3 @@ def _triangles(
                 pieces.append(np.column_stack([triangle, middle[2] + rise]))
                 block.append(int(shapes.block_of_face[f]))
     return pieces, block
-
-
-def _above(
-    points: np.ndarray, loops: list[list[int]], normal: np.ndarray, middle: np.ndarray, small: float
-) -> shapely.Geometry | None:
-    """Plan of the part of a convex body that lies above a plane; None where none does."""
-    height = (points - middle) @ normal / normal[2]
-    if height.max() <= small:
-        return None
-    edges = np.array([(a, b) for loop in loops for a, b in zip(loop, [*loop[1:], loop[0]], strict=True) if a < b])
-    crossing = edges[(height[edges] > small).any(axis=1) & (height[edges] < -small).any(axis=1)]
-    a, b = crossing.T
-    share = height[a] / (height[a] - height[b])
-    cut = points[a] + share[:, None] * (points[b] - points[a])
-    return shapely.MultiPoint(np.vstack([points[height >= -small], cut])[:, :2]).convex_hull

@@ -14,6 +14,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.regions import Choice, Region, regions_of
 from blockvis.layout.selection import sorted_out
+from blockvis.text import beginning
 from solver.mechanics import counted
 
 from .key import NOT_NEGATIVE, POSITIVE, TEXTS, Key, Section, one_of, pair_of, whole
@@ -65,11 +66,8 @@ class Bonding:
 def read_bond(table: Table) -> Bonding:
     """Read a table [[bond]]."""
     values = BOND.read(table)
-    laid = {field.name: values[field.name] for field in fields(Pattern)}
-    try:
-        pattern = Pattern(**laid)
-    except ValueError as error:
-        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+    with beginning(f"{table.source}: [{table.where}]"):
+        pattern = Pattern(**{field.name: values[field.name] for field in fields(Pattern)})
     if not values["walls"]:
         raise table.error("walls", 'is empty; name layers of the drawing: walls = ["A-WALL*"]')
     return Bonding(Choice(tuple(values["walls"]), tuple(values["openings"])), pattern, values["thickness"])
@@ -94,11 +92,9 @@ def bonded(
             number += 1
             openings = [shapely.Polygon(one.exterior) for one in shapely.get_parts(shapely.union_all(region.openings))]
             taken = shapely.union_all(region.taken) if region.taken else None
-            try:
+            on = f" on layer '{region.layer}'" if region.layer else ""
+            with beginning(f"{where}: bond: the wall '{region.name}'{on}:"):
                 stones = filled(region.wall, openings, bonding.pattern, taken, mortar=mortar)
-            except ValueError as error:
-                on = f" on layer '{region.layer}'" if region.layer else ""
-                raise ValueError(f"{where}: bond: the wall '{region.name}'{on}: {error}") from None
             names = [f"wall {number} {name}" if several else name for name in stones.names]
             notes += [
                 *(note for note in stones.notes if note not in notes),

@@ -109,9 +109,18 @@ def explain(
         _refuse_phases(case)
         refuse_ties(case)
         drawn = case_assembly(case)
-        _refuse_grounded(case_ties(case, drawn), case)
+        # Causes are movements of supports against each other alone.
+        grounded = next((tie for tie in case_ties(case, drawn) if None in tie.blocks), None)
+        if grounded is not None:
+            raise ValueError(
+                f"{case.source}: [ties '{grounded.name}'] is held by the ground, against which blockvis explain knows "
+                "no movement; hold both ends by blocks or supports"
+            )
         needs_no_crushing(case)
-        mechanics.check_settlement(*_any_settlement(drawn), case.controls)
+        # The blocks are checked with a settlement of every support.
+        roles = np.where(drawn.free, mechanics.FREE, mechanics.MOVING)
+        down = solver.Settlement(direction=unit_vector("down", drawn.dimension))
+        mechanics.check_settlement(drawn.with_roles(roles), () if drawn.free.all() else (down,), case.controls)
         ground = ground_of(drawn, case.explain, case.source)
         observations = read_observations(observed, ground.assembly, drawn)
     notes = [*(str(warning.message) for warning in caught), *ground.notes]
@@ -195,16 +204,6 @@ def _refuse_phases(case: Case) -> None:
             )
 
 
-def _refuse_grounded(ties: Sequence[solver.Tie], case: Case) -> None:
-    """Raise ValueError for ties from the ground: causes are movements of supports against each other alone."""
-    for tie in ties:
-        if None in tie.blocks:
-            raise ValueError(
-                f"{case.source}: [ties '{tie.name}'] is held by the ground, against which blockvis explain knows no "
-                "movement; hold both ends by blocks or supports"
-            )
-
-
 def read_explained(path: str | Path) -> Case:
     """Read the case file of an undamaged structure: it may have no settlement, for that is what is looked for."""
     path = Path(path)
@@ -217,13 +216,6 @@ def read_explained(path: str | Path) -> Case:
         raise ValueError(f'{path}: explain follows settlements, but [analysis] kind is "{kind["kind"]}"; leave it out')
     values["settlement"] = values.get("settlement", {"direction": [0.0, -1.0]})
     return replace(case_of(values, path, text), settlements=(), profiles=())
-
-
-def _any_settlement(assembly: solver.Assembly) -> tuple[solver.Assembly, tuple[solver.Settlement, ...]]:
-    """Make a settlement of every support, with which the blocks are checked."""
-    roles = np.where(assembly.free, mechanics.FREE, mechanics.MOVING)
-    down = solver.Settlement(direction=unit_vector("down", assembly.dimension))
-    return assembly.with_roles(roles), () if assembly.free.all() else (down,)
 
 
 def _likeliest(causes: Sequence[Cause]) -> list[Trial]:

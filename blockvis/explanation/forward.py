@@ -80,7 +80,7 @@ class Order:
 class Run:
     """What a candidate does, for every amount."""
 
-    amounts: np.ndarray  #: (n,) array [m or rad]: of the increments in equilibrium, from 0; empty where there is none.
+    amounts: np.ndarray  #: (n,) array [m or rad]: of the increments in equilibrium, from 0, or 0 alone.
     moved: np.ndarray  #: (n, n_blocks, n_dof) array [m and rad]: displacement and rotation of each block.
     fell: bool  #: Whether it ended in a collapse.
 
@@ -175,8 +175,8 @@ def followed(order: Order) -> Run:
                 break
         else:
             fell = steps.ending.collapse is not None
-    shape = solver.Pose.initial(assembly).displacements(assembly).shape
-    return Run(np.array(amounts), np.array(moved).reshape(-1, *shape), fell)
+    nothing = solver.Pose.initial(assembly).displacements(assembly)
+    return Run(np.array(amounts or [0.0]), np.array(moved or [nothing]), fell)
 
 
 @contextmanager

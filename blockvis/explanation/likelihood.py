@@ -273,12 +273,6 @@ def tried(
 ) -> Trial:
     """Compare the run of the candidate ``shared`` with the observations, at every amount up to a largest [m or rad]."""
     amounts = largest * np.geomspace(COLLAPSE, 1.0, AMOUNTS)
-    if len(run.amounts) < 2:
-        widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))
-        gaps = np.zeros((1, len(comparison.joints.rings.points)))
-        none, still = np.full(AMOUNTS, -np.inf), np.zeros((AMOUNTS, *comparison.observations.points.shape))
-        pairs = widths.astype(int)
-        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, pairs, gaps, still)
     own = amounts / twin.scale
     # At the increments the pictures are exact; between them joints open evenly.
     gaps = comparison.openings(run.moved)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.text import nearest
+from blockvis.text import beginning, nearest
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -250,11 +250,9 @@ def _outline_of(support: Mapping[str, Any], name: str) -> np.ndarray:
         raise ValueError(f"support '{name}': its outline must be corners [[x, y], ...] in m; {error}") from None
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise ValueError(f"support '{name}' needs at least three corners [x, y]; its shape is {outline.shape}")
-    try:
-        # As a block by itself, before it is one of many whose message names no support.
+    # As a block by itself, before it is one of many whose message names no support.
+    with beginning(f"support '{name}': outline:"):
         solver.Assembly.from_outlines([outline], names=[name])
-    except ValueError as error:
-        raise ValueError(f"support '{name}': outline: {error}") from None
     return outline
 
 

@@ -21,7 +21,7 @@ from .inspect import Inspection
 from .layout import Layout
 from .outlines import ROUNDING, largest_piece, pieces_of, rectangle, ring_of, touching, uncovered, without_collinear
 from .repair import repaired
-from .solids import size_of
+from .solids import plan_beyond, size_of
 
 #: Blocks of the lowest course have their bottom within this fraction of the median height of the lowest.
 COURSE = 0.5
@@ -451,19 +451,12 @@ def _pads(found: Inspection, beds: Sequence[_Foot], split: _Split) -> list[Mappi
         most, plan = STAND_OFF * math.sqrt(bed.area) + opening, bed
         for j in np.flatnonzero((low < levels[1] - ROUNDING * thick) & (high > levels[0])):
             off = min(levels[1] - low[j] + opening, most)
-            plan = plan.difference(_below(corners[j], levels[1]).buffer(off, join_style="mitre"))
+            below = plan_beyond(corners[j], levels[1] - corners[j][:, 2])
+            plan = plan.difference(below.buffer(off, join_style="mitre"))
         # Of what is all around the bed, as no hull can be, the run tells that it overlaps.
         outline = ring_of(largest_piece(plan if plan.area > EXPOSED * bed.area else bed))
         pads.append({"name": f"ground {number}", "role": role, "outline": outline.tolist(), "levels": levels})
     return pads
-
-
-def _below(points: np.ndarray, level: float) -> shapely.Geometry:
-    """Hull in plan of what of the hull of (n, 3) points is below a level [m]."""
-    low, high = points[points[:, 2] <= level, None], points[None, points[:, 2] > level]
-    share = (level - low[..., 2:]) / (high[..., 2:] - low[..., 2:])
-    section = (1.0 - share) * low + share * high
-    return shapely.MultiPoint([*low[:, 0, :2], *section.reshape(-1, 3)[:, :2]]).convex_hull
 
 
 def _split(feet: Sequence[_Foot], opening: float) -> _Split:

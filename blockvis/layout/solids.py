@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike
 
 from .triangulation import triangles_of_ring
@@ -92,6 +93,14 @@ def triangles_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarr
         across = int(np.abs(area_vectors(ring, [range(len(ring))])[0]).argmax())
         found.append(np.array(face)[triangles_of_ring(np.delete(ring, across, axis=1))])
     return np.concatenate(found)
+
+
+def plan_beyond(points: np.ndarray, height: np.ndarray, small: float = 0.0) -> shapely.Geometry:
+    """Hull in plan of what of the hull of (n, 3) points has heights (n,) [m] of at least 0, but for ``small`` [m]."""
+    up, down = height > small, height < -small
+    share = (height[up, None] / (height[up, None] - height[down]))[..., None]
+    cut = (1.0 - share) * points[up, None] + share * points[down]
+    return shapely.MultiPoint(np.vstack([points[height >= -small], cut.reshape(-1, 3)])[:, :2]).convex_hull
 
 
 def size_of(points: np.ndarray) -> float:

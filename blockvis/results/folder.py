@@ -293,8 +293,10 @@ class ResultsFolder:
 def locked(owner: object, folder: Path, what: str = "run") -> Callable[[], None]:
     """Lock the folder for one run or study, until the returned function is called or the process ends in any way."""
     handle = None
+    # Windows opens no folder, but a file that goes with its user.
+    file = (folder / LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0)) if WINDOWS else (folder, os.O_RDONLY)
     try:
-        handle = _opened_lock(folder)
+        handle = os.open(*file)
         _lock(handle)
     except (BlockingIOError, PermissionError):
         if handle is not None:
@@ -307,13 +309,6 @@ def locked(owner: object, folder: Path, what: str = "run") -> Callable[[], None]
         if handle is None:
             return lambda: None
     return weakref.finalize(owner, os.close, handle)
-
-
-def _opened_lock(folder: Path) -> int:
-    """Open what is locked: the folder itself, or on Windows, which opens no folder, a file that goes with its user."""
-    if WINDOWS:
-        return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0))
-    return os.open(folder, os.O_RDONLY)
 
 
 def _lock(handle: int) -> None:
