@@ -8,6 +8,9 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
+from blockvis.layout.joints.nearest_stone import without_short_edges
+from blockvis.layout.outlines import ring_of
+
 #: Bonds of rectangular walls.
 BONDS = ("running", "stack", "english")
 
@@ -134,44 +137,17 @@ def rubble(width: float, height: float, stone: float, flatness: float, seed: int
     for _ in range(ROUNDS):
         cells = shapely.intersection(_cells(points * stretched, frame), frame)
         points = shapely.get_coordinates(shapely.centroid(cells)) / stretched
-    cells = _closed(list(shapely.intersection(_cells(points * stretched, frame), frame)), SHORT_EDGE * stone)
-    return [shapely.transform(cell, lambda xy: xy / stretched) for cell in cells]
+    rings = [ring_of(cell) for cell in shapely.intersection(_cells(points * stretched, frame), frame)]
+    corners = np.concatenate(rings)
+    # Near the rim they stay: three stones that met there would have steep joints.
+    near = shapely.dwithin(shapely.points(corners), frame.exterior, SHORT_EDGE * stone)
+    rings = without_short_edges(rings, SHORT_EDGE * stone, corners[near])
+    return [shapely.Polygon(ring / stretched) for ring in rings]
 
 
 def _cells(points: np.ndarray, frame: shapely.Polygon) -> np.ndarray:
     cells = shapely.voronoi_polygons(shapely.MultiPoint(points), extend_to=frame.buffer(frame.length), ordered=True)
     return np.array(shapely.get_parts(cells))
-
-
-def _closed(cells: list[shapely.Polygon], shortest: float) -> list[shapely.Polygon]:
-    """Close short edges between cells: both ends move to their middle, in all cells that have them."""
-    kept = list(cells)
-    places: dict[tuple[float, float], tuple[float, float]] = {}
-    frame = shapely.union_all(cells).bounds
-
-    def rim(x: float, y: float) -> bool:
-        return min(abs(x - frame[0]), abs(x - frame[2]), abs(y - frame[1]), abs(y - frame[3])) < 1e-9
-
-    def key(x: float, y: float) -> tuple[float, float]:
-        return round(x, 7), round(y, 7)
-
-    for cell in cells:
-        ring = np.array(cell.exterior.coords)
-        for a, b in pairwise(ring.tolist()):
-            ends = key(*a), key(*b)
-            if np.hypot(a[0] - b[0], a[1] - b[1]) < shortest and not any(end in places for end in ends):
-                if rim(*a) or rim(*b):
-                    continue
-                middle = ((a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0)
-                places[ends[0]] = places[ends[1]] = middle
-    for k, cell in enumerate(cells):
-        moved = [places.get(key(x, y), (x, y)) for x, y in cell.exterior.coords]
-        corners = [p for i, p in enumerate(moved[:-1]) if p != moved[i - 1 if i else -2]]
-        kept[k] = shapely.Polygon(corners) if len(corners) > 2 else shapely.Polygon()
-    right = all(cell.is_valid and cell.area > 0.0 for cell in kept)
-    whole = sum(cell.area for cell in cells)
-    fits = right and abs(shapely.union_all(kept).area - whole) + abs(sum(c.area for c in kept) - whole) < 1e-9 * whole
-    return kept if fits else cells
 
 
 def bedded(stones: list[shapely.Polygon], wall: shapely.Geometry) -> list[shapely.Polygon]:

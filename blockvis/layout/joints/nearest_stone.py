@@ -111,7 +111,7 @@ def share_out(
         simple = _along_anchored(simple, np.array(cells), np.flatnonzero(anchored), grid)
     rings = [ring_of(cell) for cell in simple]
     fixed = np.concatenate([np.zeros((0, 2)), *(rings[i] for i in np.flatnonzero(anchored))])
-    found = [ring + origin for ring in _without_short_edges(rings, SHORTEST * size, fixed)]
+    found = [ring + origin for ring in without_short_edges(rings, SHORTEST * size, fixed)]
     return [np.asarray(outlines[i]) if anchored[i] else ring for i, ring in enumerate(found)]
 
 
@@ -240,7 +240,7 @@ def _along_anchored(simple: np.ndarray, cells: np.ndarray, anchored: np.ndarray,
     return found
 
 
-def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndarray) -> list[np.ndarray]:
+def without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndarray) -> list[np.ndarray]:
     """Let edges shorter than a length [m] shrink to a point, in all outlines that share them; ``fixed`` corners stay.
 
     Outlines that are neighbours share their corners to the last digit.
