@@ -269,7 +269,10 @@ def ties_of(
 
 def _in_blocks(entry: TieCase, assembly: solver.Assembly, gone: np.ndarray) -> solver.Tie:
     where = f"{entry.where} '{entry.name}'"
-    points = tuple(_place(end.point, assembly) for end in entry.ends)
+    # A drawing in the plane stands upright in space.
+    points = tuple(
+        end.point if len(end.point) == assembly.dimension else (end.point[0], 0.0, end.point[1]) for end in entry.ends
+    )
     along = np.subtract(points[0], points[1])
     length = float(np.linalg.norm(along))
     if not length > 0.0:
@@ -295,11 +298,6 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly, gone: np.ndarray) -> s
         prestress=entry.prestress,
         phase=entry.phase,
     )
-
-
-def _place(point: tuple[float, ...], assembly: solver.Assembly) -> tuple[float, ...]:
-    """Give a point as many coordinates as the blocks have: a drawing in the plane stands upright in space."""
-    return point if len(point) == assembly.dimension else (point[0], 0.0, point[1])
 
 
 def _holding(

@@ -199,8 +199,10 @@ def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterat
     if count < 2 or (workers is None and runs < FEWEST_FOR_PROCESSES):
         yield None
         return
-    # Processes that are forked would share the locks of this one's threads.
-    processes = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+    # Processes that are forked would share the locks of this one's threads. This one alone answers Ctrl-C of their
+    # terminal, and stops the others.
+    deaf = (signal.SIGINT, signal.SIG_IGN)
+    processes = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=signal.signal, initargs=deaf)
     before = active_children()
     try:
         yield processes
@@ -212,11 +214,6 @@ def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterat
                 child.terminate()
         raise
     processes.shutdown()
-
-
-def _ignore_interrupts() -> None:
-    """Let the first process alone answer Ctrl-C of their terminal; it stops the others."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def all_followed(orders: Sequence[Order], processes: Executor | None, progress: RunsProgress) -> list[Run]:

@@ -60,9 +60,9 @@ class Units:
         """Depth of a ring of voussoirs, or of wedges [m]: a stone, and less of long stones over a short span."""
         return min(self.length, max(self.height, RING * span))
 
-    def level_above(self, y: float, least: float) -> float:
-        """Find the first joint of a course that lies so far above a level, or a little less."""
-        return self.height * math.ceil((y + least) / self.height - 0.4)
+    def level_above(self, y: float, least: float, share: float) -> float:
+        """Find the first joint of a course that lies so far above a level, or a little less; or go a share of that."""
+        return self.height * math.ceil((y + least) / self.height - 0.4) if share == 1.0 else y + share * least
 
 
 @dataclass(frozen=True)
@@ -154,15 +154,13 @@ def _tried(top: Top, kind: str, near: float, units: Units) -> Iterator[tuple[str
 
 def _lintel(top: Top, bearings: tuple[float, float], share: float, units: Units) -> shapely.Polygon:
     least = max(units.height, LINTEL * top.span)
-    level = units.level_above(top.crown, least) if share == 1.0 else top.crown + share * least
+    level = units.level_above(top.crown, least, share)
     return shapely.box(top.left - bearings[0], top.springing, top.right + bearings[1], level)
 
 
 def _wedges(top: Top, share: float, units: Units) -> list[shapely.Polygon]:
     """Wedges of a flat arch, as those of rectangular walls."""
-    deep = units.depth_of_ring(top.span)
-    level = units.level_above(top.crown, deep) if share == 1.0 else top.crown + share * deep
-    depth = level - top.springing
+    depth = units.level_above(top.crown, units.depth_of_ring(top.span), share) - top.springing
     joints = flat_joints(top.left, top.left + top.span, top.springing, depth, SKEW, odd(top.span / units.height))
     return [shapely.Polygon(outline) for outline in voussoir_outlines(joints)]
 
