@@ -12,11 +12,11 @@ import numpy as np
 import shapely
 
 import solver
-from blockvis.layout.names import blocks_matching
 from blockvis.layout.outlines import ROUNDING, ring_of, uncovered
 from blockvis.layout.solids import plan_beyond
 from blockvis.text import listed
 
+from .block_at import blocks_matching
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
 from .toml_table import Table
 

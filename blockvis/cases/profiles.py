@@ -13,12 +13,12 @@ import numpy as np
 import shapely
 
 import solver
-from blockvis.layout.names import blocks_called
 from blockvis.layout.outlines import TOUCHING, pieces_of
 from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
 
+from .block_at import blocks_called
 from .key import NUMBER, PAIR, POSITIVE, Forms, Key, Section, ValueKind, list_of, one_of, read_by
 from .toml_table import Table, is_number, shortened
 

@@ -17,12 +17,11 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 import solver
-from blockvis.cases.block_at import distances_to
+from blockvis.cases.block_at import blocks_called, distances_to
 from blockvis.cases.profiles import pieces_named, uncut_names
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
-from blockvis.layout.names import blocks_called
 from blockvis.results.joint_faces import corners_of, on_faces
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, listed, nearest, place_text

@@ -14,11 +14,10 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import largest_piece, pieces_of, without_collinear
 from solver.mechanics import counted
 
-from .bricks import LOWEST_BRICK, NARROWEST, places_in
+from .bricks import LOWEST_BRICK, NARROWEST, in_simple_pieces, places_in, without_slivers
 from .dimensions import MOST_BLOCKS, above_zero, at_least_zero, choice, whole
 from .heads import HEADS, LESS, Units, head_of, top_of
 from .patterns import BRICKWORK, LEANS, PATTERNS, bedded, coursed, rubble
-from .slivers import in_simple_pieces, without_slivers
 
 #: What is smaller than this fraction of a brick and has no brick beside it is joined to a head.
 CRUMB = 0.1

@@ -136,15 +136,19 @@ def _crossing(arc: _Arc, width: float, stone: float, bonded: bool) -> list[tuple
         cuts = _cuts(edge, length, course, reach + SHORTEST_ARM * length)
         for quarter in range(4):
             stones += _on_diagonal(f"groin {quarter + 1}-{course}", section, cuts[0], quarter, bonded)
-            stones += _in_web(quarter, (course, arc.courses + 1 - course), section, cuts)
+            for k, (start, end) in enumerate(pairwise(cuts), start=1):
+                # On either side of the web, between the diagonals and the free edge.
+                for number, side in ((course, 1.0), (arc.courses + 1 - course, -1.0)):
+                    solid = _along_y(section * [side, 1.0], start, end)
+                    stones.append((f"web {quarter + 1}-{number}-{k}", _turned(solid, quarter)))
     if arc.crown is not None:
         course = len(arc.sections) + 1
         stones.append(("keystone", _square(arc.crown)))
         cuts = _cuts(edge, length, course, float(arc.crown[:, 0].max()) + SHORTEST_ARM * length)
         for quarter in range(4):
-            for k, (start, end) in enumerate(zip([None, *cuts[:-1]], cuts, strict=True)):
-                # The first stone begins at the keystone.
-                solid = _along_y(arc.crown, np.abs(arc.crown[:, 0]) if start is None else start, end)
+            # The first stone begins at the keystone.
+            for k, (first, end) in enumerate(zip([np.abs(arc.crown[:, 0]), *cuts[:-1]], cuts, strict=True)):
+                solid = _along_y(arc.crown, first, end)
                 stones.append((f"web {quarter + 1}-{course}-{k + 1}", _turned(solid, quarter)))
     return stones
 
@@ -252,16 +256,6 @@ def _cuts(edge: float, length: float, course: int, least: float) -> list[float]:
     offset = 1.0 if course % 2 else 0.5
     inner = edge - length * (np.arange(int(edge / length) + 1) + offset)
     return [*sorted(float(y) for y in inner if y >= least), edge]
-
-
-def _in_web(quarter: int, courses: tuple[int, int], section: np.ndarray, cuts: list[float]) -> list[tuple[str, Solid]]:
-    """Stones of a course on either side of a web, between the diagonals and the free edge."""
-    found = []
-    for k, (start, end) in enumerate(pairwise(cuts)):
-        for course, side in zip(courses, (1.0, -1.0), strict=True):
-            solid = _along_y(section * [side, 1.0], start, end)
-            found.append((f"web {quarter + 1}-{course}-{k + 1}", _turned(solid, quarter)))
-    return found
 
 
 def _along_y(section: np.ndarray, start: float | np.ndarray, end: float | np.ndarray) -> Solid:

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.cases.block_at import block_at
+from blockvis.cases.block_at import block_at, blocks_called
 from blockvis.cases.contents import Case
 from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.formats.reading import naming
-from blockvis.layout.names import blocks_called
 from blockvis.results.about import EXACT, mechanism_text
 from blockvis.text import beginning, nearest
 from solver import mechanics
