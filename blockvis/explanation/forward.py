@@ -86,12 +86,9 @@ class Run:
 
     def at(self, amounts: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Interpolate values (n, ...) of the increments at amounts (m,): (m, ...) array."""
-        place = np.clip(np.searchsorted(self.amounts, amounts, side="right") - 1, 0, max(len(self.amounts) - 2, 0))
-        following = np.minimum(place + 1, len(self.amounts) - 1)
-        step = np.maximum(self.amounts[following] - self.amounts[place], 1e-300)
-        rest = np.clip((amounts - self.amounts[place]) / step, 0.0, 1.0)
-        rest = rest.reshape(-1, *[1] * (values.ndim - 1))
-        return np.asarray(values[place] * (1.0 - rest) + values[following] * rest)
+        rest, place = np.modf(np.interp(amounts, self.amounts, np.arange(len(self.amounts))))
+        before, rest = values[place.astype(int)], rest.reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray(before * (1.0 - rest) + values[np.ceil(place + rest.ravel()).astype(int)] * rest)
 
 
 def reach_of(observations: Observations, limit: float | None) -> tuple[float, float]:

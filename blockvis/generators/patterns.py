@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 import shapely
@@ -172,7 +172,10 @@ def _joints_at_rim(rings: Sequence[np.ndarray], wall: shapely.Geometry) -> dict[
     for i, ring in enumerate(rings):
         for x, y in ring.tolist():
             at.setdefault((round(x, 9), round(y, 9)), []).append(i)
-    rim = shapely.dwithin(shapely.points(np.array(list(at))), _upright(wall), 1e-8)
+    lines = (shapely.get_coordinates(part).tolist() for part in shapely.get_parts(wall.boundary))
+    edges = chain.from_iterable(map(pairwise, lines))
+    upright = [(a, b) for a, b in edges if abs(a[0] - b[0]) < LEANS * abs(a[1] - b[1])]
+    rim = shapely.dwithin(shapely.points(np.array(list(at))), shapely.MultiLineString(upright), 1e-8)
     taken = set(map(tuple, np.round(shapely.get_coordinates(wall), 9).tolist()))
     met = zip(at.items(), rim.tolist(), strict=True)
     return {key: pair for (key, pair), on in met if on and key not in taken and len(pair) == 2}
@@ -188,12 +191,3 @@ def _levelled(ring: np.ndarray, corner: tuple[float, float]) -> tuple[float, np.
     moved = ring.copy()
     moved[k, 1] = inner[1] + np.clip(ring[k, 1] - inner[1], -most, most)
     return float(moved[k, 1]), moved
-
-
-def _upright(wall: shapely.Geometry) -> shapely.MultiLineString:
-    """Upright edges of the rim of a wall."""
-    edges = []
-    for part in shapely.get_parts(wall.boundary):
-        ends = shapely.get_coordinates(part)
-        edges += [(a, b) for a, b in pairwise(ends.tolist()) if abs(a[0] - b[0]) < LEANS * abs(a[1] - b[1])]
-    return shapely.MultiLineString(edges)

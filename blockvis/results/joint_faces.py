@@ -202,12 +202,10 @@ def faces_of(contacts: mechanics.Contacts) -> InitialJoints:
 def grouped_by_face(contacts: mechanics.Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of blocks (n, 2) and normals (n, 3) of groups of contact points in one plane, and the group of each."""
     pairs, joint = contacts.joints()
-    side = np.where(contacts.block_a == pairs[joint, 0], 1.0, -1.0) if len(contacts) else np.zeros(0)
+    side = np.where(contacts.block_a == pairs[joint, 0], 1.0, -1.0)
     own = contacts.frames[:, 0] * side[:, None]
     group = np.full(len(contacts), -1)
-    found_pairs: list[np.ndarray] = []
-    found_normals: list[np.ndarray] = []
-    count = 0
+    found_pairs, found_normals, count = [pairs[:0]], [own[:0]], 0
     left = np.arange(len(contacts))
     # Each round takes the first normal of each pair that is left; blocks that are convex have one face in common.
     while len(left):
@@ -220,8 +218,6 @@ def grouped_by_face(contacts: mechanics.Contacts) -> tuple[np.ndarray, np.ndarra
         found_pairs.append(pairs[which])
         found_normals.append(normal)
         left = left[~here]
-    if not found_pairs:
-        return np.zeros((0, 2), dtype=int), np.zeros((0, 3)), group
     return np.concatenate(found_pairs), np.concatenate(found_normals), group
 
 
