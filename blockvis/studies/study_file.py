@@ -200,12 +200,7 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
         values=values,
         n_seeded=len(imperfections),
         parameters=parameters,
-        method=method,
-        runs=asked["runs"],
-        repeats=asked["repeats"],
-        seed=asked["seed"],
-        seconds=asked["seconds"],
-        keep=asked["keep"],
+        **{key: value for key, value in asked.items() if key != "case"},
     )
     _check(study, where)
     return study
