@@ -13,7 +13,7 @@ import numpy as np
 
 import solver
 from blockvis.case_files.read import case_file_text, case_of, parsed_toml
-from blockvis.cases.build import case_assembly, case_ties
+from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
 from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.kinds.kind import needs_no_crushing
@@ -106,16 +106,9 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
-        _refuse_phases(case)
+        _refuse_unknown(case)
         refuse_ties(case)
         drawn = case_assembly(case)
-        # Causes are movements of supports against each other alone.
-        grounded = next((tie for tie in case_ties(case, drawn) if None in tie.blocks), None)
-        if grounded is not None:
-            raise ValueError(
-                f"{case.source}: [ties '{grounded.name}'] is held by the ground, against which blockvis explain knows "
-                "no movement; hold both ends by blocks or supports"
-            )
         needs_no_crushing(case)
         # The blocks are checked with a settlement of every support.
         roles = np.where(drawn.free, mechanics.FREE, mechanics.MOVING)
@@ -183,8 +176,11 @@ def _notes_of_frame(comparison: Comparison) -> list[str]:
     ]
 
 
-def _refuse_phases(case: Case) -> None:
-    """Raise ValueError for what happens between two settlements: one movement is followed, from the drawing on."""
+def _refuse_unknown(case: Case) -> None:
+    """Raise ValueError for what happens between two settlements, and for ties from the ground.
+
+    One movement of supports against each other is followed, from the drawing on.
+    """
     if case.removals:
         raise ValueError(
             f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
@@ -195,6 +191,11 @@ def _refuse_phases(case: Case) -> None:
             raise ValueError(
                 f"{tie.where} '{tie.name}': phase is {tie.phase}, and blockvis explain follows one movement of the "
                 "supports; leave phase out, or a tie that was installed after the cracks"
+            )
+        if any(end.fixed for end in tie.ends):
+            raise ValueError(
+                f"{tie.where} '{tie.name}' is held by the ground, against which blockvis explain knows no movement; "
+                "hold both ends by blocks or supports"
             )
     for number, load in enumerate(case.loads, start=1):
         if load.phase > 1:

@@ -94,9 +94,7 @@ def assemble(
         if note:
             warnings.warn(f"{where}: {note}", stacklevel=2)
     if supports:
-        laid = supports_of(supports, layout.dimension)
-        keys = ("names", "roles", "materials", "density", "thickness")
-        layout = layout.with_more(laid.blocks, **{key: getattr(laid, key) for key in keys})
+        layout = layout.with_more(**vars(supports_of(supports, layout.dimension)))
     anchored = np.arange(layout.n_blocks) >= n_drawn
     of_blocks: dict[str, Any] = {
         "names": layout.names,

@@ -164,10 +164,7 @@ def _laid(found: Inspection) -> Ground:
         is_level = np.ptp([foot.level for foot in beds]) < 1e-3 * depth
         supports = _slab(found, beds, split, depth) if is_level and not springers else _pads(found, beds, split)
     elif beds:
-        # With joints closed, and as drawn: there a stone may reach lower.
-        both = zip(outlines, _as_simplified(found), _standing(found, outlines), strict=True)
-        standing = [ring for closed, drawn, stands in both if stands for ring in (closed, drawn)]
-        supports = _bedded(standing, feet, split, depth, _opening(found))
+        supports = _bedded(_drawn_and_closed(found, outlines), feet, split, depth, _opening(found))
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
     here = f"the ground below it {said if split.axis else 'stands on the left and settles on the right'}"
@@ -178,6 +175,12 @@ def _laid(found: Inspection) -> Ground:
         )
     settles = mechanics.MOVING in [*roles.values(), *(support["role"] for support in supports)]
     return Ground(f"The drawing has no supports: here {here}.", roles, tuple(supports), settles)
+
+
+def _drawn_and_closed(found: Inspection, outlines: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """(n, 2) arrays: blocks that stand, with their joints closed and as drawn: there a stone may reach lower."""
+    both = zip(outlines, _as_simplified(found), _standing(found, outlines), strict=True)
+    return [ring for closed, drawn, stands in both if stands for ring in (closed, drawn)]
 
 
 def _on_a_level(found: Inspection) -> _Foot:

@@ -83,12 +83,7 @@ def regions_of(
     walls = _walls_of(layout, drawn, free, choices)
     regions = [_nested([drawn[k] for k, n in walls.items() if n == number]) for number in range(len(choices))]
     every = [(region, number) for number, group in enumerate(regions) for region in group]
-    for region, number in every:
-        # Walls of other choices are none of the larger ones around them.
-        region.taken.extend(
-            other.wall for other, n in every
-            if n != number and other.wall.area < region.wall.area and share_in(other.wall, region.wall) > ROUNDING
-        )  # fmt: skip
+    _take_out(every)
     others = [k for k in free if k not in walls]
     opened = {k: _opened_by(drawn[k], every, choices, layout.source) for k in others}
     for k, around in opened.items():
@@ -97,10 +92,22 @@ def regions_of(
     left = [k for k in others if not opened[k] and drawn[k].block >= 0]
     notes = [*layout.notes, *_reaching_out(every), *_left_in(drawn, left, every)]
     used = [drawn[k] for k in (*walls, *filter(opened.get, others))]
+    return regions, replace(_without(layout, used), notes=tuple(notes))
+
+
+def _take_out(every: Sequence[tuple[Region, int]]) -> None:
+    """Take walls of other choices, by their number, out of the larger ones around them."""
+    for region, number in every:
+        region.taken.extend(
+            other.wall for other, n in every
+            if n != number and other.wall.area < region.wall.area and share_in(other.wall, region.wall) > ROUNDING
+        )  # fmt: skip
+
+
+def _without(layout: Layout, used: Sequence[_Drawn]) -> Layout:
     blocks, items = {one.block for one in used}, {one.item for one in used}
-    left_out = tuple(one for i, one in enumerate(layout.left_out) if i not in items)
     rest = layout.chosen([i for i in range(layout.n_blocks) if i not in blocks])
-    return regions, replace(rest, left_out=left_out, notes=tuple(notes))
+    return replace(rest, left_out=tuple(one for i, one in enumerate(layout.left_out) if i not in items))
 
 
 def _walls_of(

@@ -45,12 +45,10 @@ def proposed_ignore(
     for patterns, blocks in sorted(known.items(), key=rank)[:TRIES]:
         try:
             without = read_without(patterns)
-            if without.n_blocks < (1.0 - LESS) * layout.n_blocks:
+            too_few = without.n_blocks < (1.0 - LESS) * layout.n_blocks
+            if too_few or (found := inspected(without)).refused or found.deep:
                 continue
-            found = inspected(without)
         except ValueError:
-            continue
-        if found.refused or found.deep:
             continue
         options = " ".join(f'--ignore "{pattern}"' for pattern in patterns)
         listed = ", ".join(f'"{pattern}"' for pattern in patterns)

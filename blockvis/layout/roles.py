@@ -27,8 +27,7 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
 
     Keys that match no block are refused, or left out where some blocks are still to come.
     """
-    said = zip(layout.roles, *(map(str.lower, map(str.strip, of)) for of in (layout.groups, layout.names)), strict=True)
-    found = [next((word for word in words if word in mechanics.ROLES), mechanics.FREE) for words in said]
+    found = [_drawn_role(layout, i) for i in range(layout.n_blocks)]
     own = mechanics.unique_names(layout.names)
     labels = list(zip(layout.names, layout.groups, layout.materials, strict=True))
     # Of keys that hold for one block a pattern has the first word, and the block's own name the last.
@@ -51,6 +50,11 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
         for i in blocks:
             found[i] = role
     return found
+
+
+def _drawn_role(layout: Layout, block: int) -> str:
+    said = (layout.roles[block], layout.groups[block].strip().lower(), layout.names[block].strip().lower())
+    return next((word for word in said if word in mechanics.ROLES), mechanics.FREE)
 
 
 def told_apart(layout: Layout, roles: Mapping[str, str]) -> tuple[list[tuple[int, int]], np.ndarray]:

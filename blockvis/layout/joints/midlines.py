@@ -60,12 +60,12 @@ def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: floa
         else:
             uncommon.append(int(k))
     # Edges that share no line have one fitted to their own midlines alone.
-    alone: dict[int, list[int]] = {}
-    for k in uncommon:
-        for edge in (int(found.edge_a[k]), int(found.edge_b[k])):
-            if edge not in line_of and not anchored[edges.block[edge]]:
-                alone.setdefault(edge, []).append(k)
-    line_of |= {edge: _fitted(found, middle, stretches, [], closed) for edge, stretches in alone.items()}
+    sides, stretches = np.concatenate([found.edge_a[uncommon], found.edge_b[uncommon]]), np.tile(uncommon, 2)
+    line_of |= {
+        edge: _fitted(found, middle, stretches[sides == edge].tolist(), [], closed)
+        for edge in np.unique(sides).tolist()
+        if edge not in line_of and not anchored[edges.block[edge]]
+    }
     lines = {
         edge: line
         for edge, line in line_of.items()
