@@ -924,8 +924,9 @@ def _info(options: argparse.Namespace) -> int:
 
 def _convert(options: argparse.Namespace) -> int:
     from .formats.read import read_layout, write_layout
-    from .layout.assemble import assemble, without_twins
+    from .layout.assemble import assemble
     from .layout.layout import layout_of
+    from .layout.roles import without_twins
 
     target = _new_file(options.target, options.force)
     if (Path(options.source) / "assembly.npz").is_file():

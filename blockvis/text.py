@@ -7,7 +7,8 @@ import math
 import re
 import shlex
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,15 @@ def refuse_magnitude(value: float) -> str:
     # Neither NaN nor infinity is out of range: that they are no finite numbers is said elsewhere.
     out = 0 < abs(value) < SMALLEST or LARGEST < abs(value) < math.inf
     return f"give a number of {SMALLEST:g} to {LARGEST:g}" if out else ""
+
+
+@contextmanager
+def beginning(where: str) -> Iterator[None]:
+    """Let what is refused, a ValueError, begin with where that is."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{where} {error}") from None
 
 
 def listed(words: Sequence[str], most: int = 6) -> str:

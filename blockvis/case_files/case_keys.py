@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,7 @@ from blockvis.cases.key import (
     list_of,
     one_of,
     pair_of,
+    read_by,
     whole,
 )
 from blockvis.cases.profiles import PROFILE, PROFILES
@@ -45,10 +46,10 @@ from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
 from blockvis.layout.inspect import DENSITY
 from blockvis.layout.joints.close import WAYS
+from blockvis.layout.selection import checked_window
 from blockvis.layout.sights import SIGHTS, read_cut, read_sight
 from blockvis.layout.units import UNITS
 from blockvis.layout.views import VIEWS, checked_dimension
-from blockvis.layout.window import checked_window
 from blockvis.results.folder import FOLDERS, VIDEO_SUFFIXES
 from solver import mechanics
 
@@ -95,10 +96,9 @@ def _film(table: Table, key: Key) -> str | bool | None:
     return name
 
 
-def _background(table: Table, key: Key) -> int | str | None:
-    value: int | str | None = table.take(key.name)
-    if value is not None and (isinstance(value, bool) or not isinstance(value, int | str)):
-        raise table.error(key.name, f'is {shortened(value)}; give a whole number, or a colour such as "white"')
+def _background(value: Any) -> int | str:
+    if isinstance(value, bool) or not isinstance(value, int | str):
+        raise ValueError(f'is {shortened(value)}; give a whole number, or a colour such as "white"')
     return value
 
 
@@ -115,28 +115,12 @@ def _two_names(table: Table, key: Key) -> tuple[str, str]:
     return pair[0], pair[1]
 
 
-def _places(table: Table, key: Key) -> tuple[float, ...] | None:
-    given = table.numbers(key.name)
-    if given is None:
-        return None
+def _places(given: tuple[float, ...]) -> tuple[float, ...]:
     if len(given) != 3 or given[2] != int(given[2]) or not 2 <= given[2] <= MOST_STEPS or given[0] >= given[1]:
         says = f"[first x, last x, number of places], from 2 to {MOST_STEPS} places"
-        raise table.error(key.name, f"is {list(given)}; give {says}")
+        raise ValueError(f"is {list(given)}; give {says}")
     # Tables have -2.2, and not -2.1999999999999997.
     return tuple(np.linspace(given[0], given[1], int(given[2])).round(12).tolist())
-
-
-def _read_by(read: Callable[[Any], Any], take: Callable[[Table, str], Any] = Table.take) -> Callable[[Table, Key], Any]:
-    """Make the reader of values that ``read`` checks."""
-
-    def checked(table: Table, key: Key) -> Any:
-        value = take(table, key.name)
-        try:
-            return None if value is None else read(value)
-        except ValueError as error:
-            raise table.error(key.name, str(error).removeprefix(f"{key.name} ")) from None
-
-    return checked
 
 
 _LAYOUT = ValueKind(
@@ -154,16 +138,16 @@ _FILM = ValueKind(
     {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$|^[^/\\.]+/$"}, {"const": False}]},
     _film,
 )
-_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, _read_by(checked_dimension))
-_BACKGROUND = ValueKind("whole number or colour", {"anyOf": [{"type": "integer"}, {"type": "string"}]}, _background)
+_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, read_by(checked_dimension))
+_BACKGROUND = ValueKind("whole number or colour", {"type": ["integer", "string"]}, read_by(_background))
 _MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]}, _moment)
 _TWO_NAMES = ValueKind("two texts", list_of(TEXT.schema, 2, 2), _two_names)
-_PLACES = ValueKind("three numbers: from, to, number of places", list_of(NUMBER.schema, 3, 3), _places)
+_PLACES = replace(TRIPLE, words="three numbers: from, to, number of places", read=read_by(_places, Table.numbers))
 _LEVELS = pair_of("[bottom, top]")
 # Of the kinds that there are when a case is read.
 _KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
 _PUSHES = pair_of("[x, y]: pressure is of blocks in the plane, in space give force")
-_WINDOW = ValueKind("four numbers", list_of(NUMBER.schema, 4, 4), _read_by(checked_window, Table.numbers))
+_WINDOW = ValueKind("four numbers", list_of(NUMBER.schema, 4, 4), read_by(checked_window, Table.numbers))
 _SIGHT = ValueKind(
     "a word, or table: azimuth, elevation",
     {
@@ -180,7 +164,7 @@ _SIGHT = ValueKind(
             },
         ]
     },
-    _read_by(read_sight),
+    read_by(read_sight),
 )
 _CUT = ValueKind(
     'text as "y = 1.2", or table: normal, point',
@@ -195,7 +179,7 @@ _CUT = ValueKind(
             },
         ]
     },
-    _read_by(read_cut),
+    read_by(read_cut),
 )
 
 

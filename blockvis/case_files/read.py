@@ -26,7 +26,7 @@ from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
 from blockvis.kinds.kinds import KINDS
 from blockvis.kinds.pushover import CONTROL
-from blockvis.text import as_key, files_like
+from blockvis.text import as_key, beginning, files_like
 from solver import mechanics
 
 from . import case_keys as keys
@@ -100,10 +100,8 @@ def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
         key, equals, value = change.partition("=")
         if not equals:
             raise ValueError(f"'{change}' is no change of a case; write key=value, as in material.density=1800")
-        try:
+        with beginning(f"{source}: cannot set '{key.strip()}':"):
             put(document, parse_path(key.strip()), toml_value(value))
-        except ValueError as error:
-            raise ValueError(f"{source}: cannot set '{key.strip()}': {error}") from None
     return tomlkit.dumps(document)
 
 
@@ -306,10 +304,8 @@ def _densities(materials: Table) -> dict[str, Any]:
 
 
 def _checked_law(table: Table, values: Mapping[str, Any]) -> solver.InterfaceLaw:
-    try:
+    with beginning(f"{table.source}: [{table.where}]"):
         return solver.InterfaceLaw(**values)
-    except ValueError as error:
-        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
 
 def _interfaces(top: Table) -> dict[tuple[str, str], solver.InterfaceLaw]:

@@ -5,16 +5,18 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import shapely
 
 import solver
-from blockvis.layout.names import blocks_matching
-from blockvis.layout.outlines import ROUNDING, ring_of
+from blockvis.layout.outlines import ROUNDING, ring_of, uncovered
+from blockvis.layout.solids import plan_beyond
 from blockvis.text import listed
 
+from .block_at import blocks_matching
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
 from .toml_table import Table
 
@@ -123,49 +125,37 @@ def lay_backfill(
             raise ValueError(f"{where} {key} is {value:g}; give a number {'of at least' if least == 0 else 'above'} 0")
     if not np.isfinite(surface):
         raise ValueError(f"{where} surface is {surface:g} m; give the height of its top, a finite number")
-    pieces, block = _extrados(assembly, _chosen(names, assembly, where), surface)
+    named = [blocks_matching(name, assembly, f"{where} over") for name in names]
+    chosen = assembly.free & np.isin(np.arange(assembly.n_blocks), [*chain(*named)])
+    if not chosen.any():
+        raise ValueError(f"{where} over: '{listed(names)}' are supports only; fill loads free blocks: name one")
+    d, small = assembly.dimension, ROUNDING * assembly.block_size
+    seen, owners = (_segments if d == 2 else _triangles)(assembly, chosen, surface, small)
+    pieces, block = np.array(seen, dtype=float).reshape(-1, d, d), np.array(owners, dtype=int)
     if not len(pieces):
         raise ValueError(f"{where} over: none of '{listed(names)}' looks up to the surface; name the topmost blocks")
-    bare = [f"'{name}'" for name in names if not np.isin(blocks_matching(name, assembly, where), block).any()]
+    bare = [f"'{name}'" for name, own in zip(names, named, strict=True) if not np.isin(own, block).any()]
     if bare:
         words = f"no fill lies on {listed(bare)}: no free block of that name looks up to the surface"
         warnings.warn(f"{where} over: {words}; name the topmost blocks", stacklevel=2)
     heights = pieces[:, :, -1].max(axis=1)
     highest = int(heights.argmax())
-    if heights[highest] > surface + ROUNDING * assembly.block_size:
+    if heights[highest] > surface + small:
         raise ValueError(
             f"{where} surface is {surface:g} m, below the extrados of block '{assembly.names[block[highest]]}', which "
             f"reaches {heights[highest]:.6g} m; raise it, or leave the block out of over"
         )
-    thickness = assembly.thickness[block] if assembly.dimension == 2 else None
+    thickness = assembly.thickness[block] if d == 2 else None
     return solver.Backfill(pieces, block, surface, unit_weight, pressure_coefficient, thickness)
-
-
-def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.ndarray:
-    """(n_blocks,) bool array: the free blocks of these names or materials."""
-    chosen = np.zeros(assembly.n_blocks, dtype=bool)
-    for pattern in over:
-        chosen[blocks_matching(pattern, assembly, f"{where} over")] = True
-    if not (chosen & assembly.free).any():
-        raise ValueError(f"{where} over: '{listed(over)}' are supports only; fill loads free blocks: name one")
-    return chosen & assembly.free
-
-
-def _extrados(assembly: solver.Assembly, chosen: np.ndarray, surface: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find the pieces of chosen blocks that look upwards and see a level surface [m], and the block of each.
-
-    They are (n, d, d) [m]: segments in the plane, triangles in space. What other blocks hide is left out; what stands
-    above the surface hides nothing.
-    """
-    small = ROUNDING * assembly.block_size
-    pieces, block = (_segments if assembly.dimension == 2 else _triangles)(assembly, chosen, surface, small)
-    d = assembly.dimension
-    return np.array(pieces, dtype=float).reshape(-1, d, d), np.array(block, dtype=int)
 
 
 def _segments(
     assembly: solver.Assembly, chosen: np.ndarray, surface: float, small: float
 ) -> tuple[list[np.ndarray], list[int]]:
+    """Find the segments (2, 2) [m] of chosen blocks that look upwards and see a level surface [m], and their blocks.
+
+    What other blocks hide is left out; what stands above the surface hides nothing.
+    """
     start, stop = assembly.vertices, assembly.vertices[assembly.polygons.next_vertex]
     owner = assembly.block_of_vertex
     edges = np.flatnonzero(chosen[owner] & (start[:, 0] - stop[:, 0] > small))
@@ -189,13 +179,9 @@ def _segments(
             left, _, right, _ = cover.bounds or (0.0, 0.0, 0.0, 0.0)
             if cover.area > small * max(right - left, small):
                 hidden.append((left, right))
-        at = float(stop[e, 0])
-        seen = []
-        for left, right in [*sorted(hidden), (float(start[e, 0]), np.inf)]:
-            if left - at > small:
-                seen.append((at, left))
-            at = max(at, right)
-        for left, right in seen:
+        for left, right in uncovered(float(stop[e, 0]), float(start[e, 0]), hidden):
+            if right - left <= small:
+                continue
             parts = (np.array([[right], [left]]) - start[e, 0]) / (stop[e, 0] - start[e, 0])
             pieces.append(start[e] + parts * (stop[e] - start[e]))
             block.append(int(owner[e]))
@@ -205,13 +191,14 @@ def _segments(
 def _triangles(
     assembly: solver.Assembly, chosen: np.ndarray, surface: float, small: float
 ) -> tuple[list[np.ndarray], list[int]]:
+    """Find triangles (3, 3) [m] in space, as :func:`_segments` finds segments in the plane."""
     shapes, solids = assembly.polyhedra, assembly.polyhedra.parts.solids
     faces = shapes.faces(shapes.vertices)
     chosen_faces = np.flatnonzero(chosen[shapes.block_of_face] & (faces.normals[:, 2] > ROUNDING))
     plans = [shapes.vertices[shapes.corners[slice(*shapes.face_offsets[f : f + 2])]] for f in chosen_faces]
     seen = np.array([shapely.Polygon(plan[:, :2]) for plan in plans])
-    bodies = [solids.surface(k) for k in range(len(solids))]
-    footprints = np.array([shapely.MultiPoint(points[:, :2]).convex_hull for points, _ in bodies])
+    bodies = [solids.surface(k)[0] for k in range(len(solids))]
+    footprints = np.array([shapely.MultiPoint(points[:, :2]).convex_hull for points in bodies])
     low = np.minimum.reduceat(solids.vertices[:, 2], solids.offsets[:-1])
     face, part = shapely.STRtree(footprints).query(seen, predicate="intersects")
     touching = shapely.area(shapely.intersection(seen[face], footprints[part])) > small * assembly.block_size
@@ -222,9 +209,9 @@ def _triangles(
         for p in part[(face == k) & touching].tolist():
             if low[p] >= surface:
                 continue
-            cover = _above(bodies[p][0], bodies[p][1], normal, middle, small)
-            if cover is not None:
-                left = left.difference(cover)
+            height = (bodies[p] - middle) @ normal / normal[2]
+            if height.max() > small:
+                left = left.difference(plan_beyond(bodies[p], height, small))
         for polygon in shapely.get_parts(left):
             if polygon.area <= small * assembly.block_size:
                 continue
@@ -233,18 +220,3 @@ def _triangles(
                 pieces.append(np.column_stack([triangle, middle[2] + rise]))
                 block.append(int(shapes.block_of_face[f]))
     return pieces, block
-
-
-def _above(
-    points: np.ndarray, loops: list[list[int]], normal: np.ndarray, middle: np.ndarray, small: float
-) -> shapely.Geometry | None:
-    """Plan of the part of a convex body that lies above a plane; None where none does."""
-    height = (points - middle) @ normal / normal[2]
-    if height.max() <= small:
-        return None
-    edges = np.array([(a, b) for loop in loops for a, b in zip(loop, [*loop[1:], loop[0]], strict=True) if a < b])
-    crossing = edges[(height[edges] > small).any(axis=1) & (height[edges] < -small).any(axis=1)]
-    a, b = crossing.T
-    share = height[a] / (height[a] - height[b])
-    cut = points[a] + share[:, None] * (points[b] - points[a])
-    return shapely.MultiPoint(np.vstack([points[height >= -small], cut])[:, :2]).convex_hull

@@ -14,6 +14,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.regions import Choice, Region, regions_of
 from blockvis.layout.selection import sorted_out
+from blockvis.text import beginning
 from solver.mechanics import counted
 
 from .key import NOT_NEGATIVE, POSITIVE, TEXTS, Key, Section, one_of, pair_of, whole
@@ -65,11 +66,8 @@ class Bonding:
 def read_bond(table: Table) -> Bonding:
     """Read a table [[bond]]."""
     values = BOND.read(table)
-    laid = {field.name: values[field.name] for field in fields(Pattern)}
-    try:
-        pattern = Pattern(**laid)
-    except ValueError as error:
-        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+    with beginning(f"{table.source}: [{table.where}]"):
+        pattern = Pattern(**{field.name: values[field.name] for field in fields(Pattern)})
     if not values["walls"]:
         raise table.error("walls", 'is empty; name layers of the drawing: walls = ["A-WALL*"]')
     return Bonding(Choice(tuple(values["walls"]), tuple(values["openings"])), pattern, values["thickness"])
@@ -93,7 +91,10 @@ def bonded(
         for region in regions:
             number += 1
             openings = [shapely.Polygon(one.exterior) for one in shapely.get_parts(shapely.union_all(region.openings))]
-            stones = _filled(region, openings, bonding.pattern, f"{where}: bond", mortar)
+            taken = shapely.union_all(region.taken) if region.taken else None
+            on = f" on layer '{region.layer}'" if region.layer else ""
+            with beginning(f"{where}: bond: the wall '{region.name}'{on}:"):
+                stones = filled(region.wall, openings, bonding.pattern, taken, mortar=mortar)
             names = [f"wall {number} {name}" if several else name for name in stones.names]
             notes += [
                 *(note for note in stones.notes if note not in notes),
@@ -103,15 +104,6 @@ def bonded(
             more = {key: [value] * stones.n_blocks for key, value in every.items() if value is not None}
             rest = rest.with_more(stones.blocks, names=names, materials=stones.materials, **more)
     return sorted_out(replace(rest, notes=tuple(notes)))
-
-
-def _filled(region: Region, openings: Sequence[shapely.Polygon], pattern: Pattern, where: str, mortar: bool) -> Layout:
-    taken = shapely.union_all(region.taken) if region.taken else None
-    try:
-        return filled(region.wall, openings, pattern, taken, mortar=mortar)
-    except ValueError as error:
-        on = f" on layer '{region.layer}'" if region.layer else ""
-        raise ValueError(f"{where}: the wall '{region.name}'{on}: {error}") from None
 
 
 def _told(region: Region, openings: int, stones: Layout, pattern: Pattern) -> Note:

@@ -20,7 +20,7 @@ from blockvis.layout.inspect import DENSITY
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import doubt, units_instead
-from blockvis.text import listed, nearest
+from blockvis.text import beginning, listed, nearest
 from solver import mechanics
 from solver.mechanics import counted, steep_note
 
@@ -62,10 +62,8 @@ def case_assembly(case: Case) -> solver.Assembly:
     _note_kept(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
-    try:
+    with beginning(f"{case.source}: [[supports]]"):
         supports_of(case.supports, sketch.dimension)
-    except ValueError as error:
-        raise ValueError(f"{case.source}: [[supports]] {error}") from None
     try:
         assembly = assemble(
             sketch,

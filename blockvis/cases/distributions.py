@@ -64,8 +64,13 @@ class Distribution:
         p, n = np.asarray(probability, dtype=float), self.numbers
         if self.kind in CUT_OFF:
             below, inside = self._inside()
+            normal = special.ndtri(below + p * inside)
+            if self.kind == "normal":
+                value = n["mean"] + n["deviation"] * normal
+            else:
+                centre, spread = self._logarithm()
+                value = np.exp(centre + spread * normal)
             # Rounding may carry a value beyond a limit that has a physical meaning.
-            value = self._untruncated(special.ndtri(below + p * inside))
             value = np.clip(value, n.get("lower", -np.inf), n.get("upper", np.inf))
         elif self.kind == "uniform":
             value = n["lower"] + p * (n["upper"] - n["lower"])
@@ -84,13 +89,6 @@ class Distribution:
     def lowest(self) -> float:
         """Lower bound of the variable."""
         return self.numbers.get("lower", 0.0 if self.kind == "lognormal" else -math.inf)
-
-    def _untruncated(self, normal: np.ndarray) -> np.ndarray:
-        """Turn standard normal values into values of the variable."""
-        if self.kind == "normal":
-            return self.numbers["mean"] + self.numbers["deviation"] * normal
-        centre, spread = self._logarithm()
-        return np.exp(centre + spread * normal)
 
     def _logarithm(self) -> tuple[float, float]:
         """Mean and deviation of the logarithm of a lognormal variable."""

@@ -5,7 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .key import FRACTION, NOT_NEGATIVE, NUMBERS, POSITIVE, TEXTS, TRUE_OR_FALSE, Key, Section, ValueKind, pair_of
+from .key import (
+    FRACTION,
+    NOT_NEGATIVE,
+    NUMBERS,
+    POSITIVE,
+    TEXTS,
+    TRUE_OR_FALSE,
+    Key,
+    Section,
+    ValueKind,
+    pair_of,
+    read_by,
+)
 from .toml_table import Table, shortened
 
 _RANGE = pair_of("[least, largest]")
@@ -37,21 +49,18 @@ class ExplainSettings:
 _EXPLAIN = ExplainSettings()
 
 
-def _directions(table: Table, key: Key) -> tuple[str, ...] | None:
-    words = table.texts(key.name)
-    if words is not None and (not words or not set(words).issubset(DIRECTIONS)):
-        raise table.error(key.name, f"is {shortened(list(words))}; choose from {', '.join(DIRECTIONS)}")
+def _directions(words: tuple[str, ...]) -> tuple[str, ...]:
+    if not words or not set(words).issubset(DIRECTIONS):
+        raise ValueError(f"is {shortened(list(words))}; choose from {', '.join(DIRECTIONS)}")
     return words
 
 
-def _groups(table: Table, key: Key) -> tuple[tuple[str, ...], ...]:
-    given = table.take(key.name)
-    entries = [given] if isinstance(given, str) else [] if given is None else given
-    groups = []
+def _groups(given: Any) -> tuple[tuple[str, ...], ...]:
+    entries, groups = [given] if isinstance(given, str) else given, []
     for entry in entries if isinstance(entries, list | tuple) else [None]:
         names = [entry] if isinstance(entry, str) else entry
         if not isinstance(names, list | tuple) or not names or not all(isinstance(name, str) for name in names):
-            raise table.error(key.name, f'is {shortened(given)}; give names, ["left", ["middle", "right"]]')
+            raise ValueError(f'is {shortened(given)}; give names, ["left", ["middle", "right"]]')
         groups.append(tuple(names))
     return tuple(groups)
 
@@ -59,7 +68,7 @@ def _groups(table: Table, key: Key) -> tuple[tuple[str, ...], ...]:
 _GROUPS = ValueKind(
     "list of names, or of lists of names",
     {"anyOf": [{"type": "string"}, {"type": "array", "items": TEXTS.schema}]},
-    _groups,
+    read_by(_groups),
 )
 
 EXPLAIN = Section(
@@ -70,7 +79,7 @@ EXPLAIN = Section(
             ["pier", ["left", "right"]],
             otherwise="each support of the drawing"),
         Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}},
-            _directions),
+            read_by(_directions, Table.texts)),
             "Ways in which they may have moved", ["down", "rotation"],
             otherwise="down, left, right and rotation; in space outward, front and back, too, or, of more than four "
             "supports, down and outward"),

@@ -113,7 +113,7 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     Corners at one place move together. A corner on the edge of another block slides along this edge and moves with it:
     bed joints of a wall stay straight from end to end, head joints move and tilt. Corners of supports stay.
     """
-    vertices, owner = assembly.vertices, assembly.block_of_vertex
+    vertices, owner, following = assembly.vertices, assembly.block_of_vertex, assembly.polygons.next_vertex
     near = DRAWN_GAP * float(assembly.widths.min())
     place = within_reach(vertices, near)
     n = int(place.max()) + 1
@@ -137,16 +137,18 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
             f"{np.median(LARGEST_SHARE * share):.3g} m; make them smaller"
         )
     drawn *= np.where(too_far, LARGEST_SHARE * share / np.maximum(size, 1e-300), 1.0)[:, None]
-    new = _on_rails(positions, drawn, rails, place, assembly.polygons.next_vertex)
+    new = _on_rails(positions, drawn, rails, place, following)
     for _ in range(HALVINGS):
         # A cut brick has edges much shorter than those along which its corners slide, and moves with them.
-        distorted = _distorted(assembly, positions, new, place)
-        if not distorted.any():
+        before = positions[place[following]] - positions[place]
+        change = new[place[following]] - new[place] - before
+        too_much = np.hypot(*change.T) > LARGEST_CHANGE * np.hypot(*before.T)
+        if not too_much.any():
             break
-        near_by = set(place[distorted[owner]].tolist())
-        rail_ends = [(place[rails[p]], place[assembly.polygons.next_vertex[rails[p]]]) for p in near_by if p in rails]
+        near_by = set(place[np.isin(owner, owner[too_much])].tolist())
+        rail_ends = [(place[rails[p]], place[following[rails[p]]]) for p in near_by if p in rails]
         drawn[sorted(near_by.union(*rail_ends))] /= 2.0
-        new = _on_rails(positions, drawn, rails, place, assembly.polygons.next_vertex)
+        new = _on_rails(positions, drawn, rails, place, following)
 
     try:
         moved = solver.Assembly.from_outlines(
@@ -175,15 +177,6 @@ def _rails(assembly: solver.Assembly, positions: np.ndarray, place: np.ndarray, 
     point, edge = point[inside], edge[inside]
     shortest_first = np.lexsort((-edge, length[edge], point))
     return dict(zip(point[shortest_first].tolist(), edge[shortest_first].tolist(), strict=True))
-
-
-def _distorted(assembly: solver.Assembly, positions: np.ndarray, new: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """(n_blocks,) bool array: blocks with an edge that has changed by more than half its length."""
-    following = assembly.polygons.next_vertex
-    before = positions[place[following]] - positions[place]
-    change = new[place[following]] - new[place] - before
-    too_much = np.hypot(*change.T) > LARGEST_CHANGE * np.hypot(*before.T)
-    return np.bincount(assembly.block_of_vertex, weights=too_much, minlength=assembly.n_blocks) > 0
 
 
 def _on_rails(

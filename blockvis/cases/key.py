@@ -30,13 +30,25 @@ def list_of(item: Mapping[str, Any], least: int, most: int | None = None) -> dic
 _QUANTITIES = {"m": "length in m", "Pa": "stress in Pa"}
 
 
-def _outline(table: Table, key: Key) -> list[Any]:
-    corners = table.take(key.name)
+def read_by(read: Callable[[Any], Any], take: Callable[[Table, str], Any] = Table.take) -> Callable[[Table, Key], Any]:
+    """Make the reader of values that ``read`` checks, with a ValueError of what is wrong and the remedy."""
+
+    def checked(table: Table, key: Key) -> Any:
+        value = take(table, key.name)
+        try:
+            return None if value is None else read(value)
+        except ValueError as error:
+            raise table.error(key.name, str(error).removeprefix(f"{key.name} ")) from None
+
+    return checked
+
+
+def _outline(corners: Any) -> list[Any]:
     if not isinstance(corners, list) or len(corners) < 3:
-        raise table.error(key.name, f"is {shortened(corners)}; give at least three corners [[x, y], ...]")
+        raise ValueError(f"is {shortened(corners)}; give at least three corners [[x, y], ...]")
     for corner in corners:
         if not isinstance(corner, (list, tuple)) or len(corner) != 2 or not all(map(is_number, corner)):
-            raise table.error(key.name, f"has the corner {shortened(corner)}; give two numbers [x, y]")
+            raise ValueError(f"has the corner {shortened(corner)}; give two numbers [x, y]")
     return corners
 
 
@@ -83,7 +95,7 @@ TRIPLE = ValueKind(
     lambda table, key: table.vector(key.name, (3,), "three numbers [x, y, z]"),
 )
 NUMBERS = ValueKind("list of numbers", list_of({"type": "number"}, 1), lambda table, key: table.numbers(key.name))
-OUTLINE = ValueKind("list of at least three corners", list_of(list_of({"type": "number"}, 2, 2), 3), _outline)
+OUTLINE = ValueKind("list of at least three corners", list_of(list_of({"type": "number"}, 2, 2), 3), read_by(_outline))
 
 
 def whole(least: int, most: int | None = None) -> ValueKind:

@@ -11,11 +11,10 @@ import numpy as np
 
 import solver
 from blockvis.formats.reading import naming
-from blockvis.layout.names import blocks_matching
 from blockvis.layout.outlines import ROUNDING
 from blockvis.text import force_text
 
-from .block_at import block_at, note_outside
+from .block_at import block_at, blocks_matching, note_outside
 
 
 @dataclass(frozen=True)

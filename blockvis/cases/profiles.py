@@ -13,13 +13,13 @@ import numpy as np
 import shapely
 
 import solver
-from blockvis.layout.names import blocks_called
 from blockvis.layout.outlines import TOUCHING, pieces_of
 from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
 
-from .key import NUMBER, PAIR, POSITIVE, Forms, Key, Section, ValueKind, list_of, one_of
+from .block_at import blocks_called
+from .key import NUMBER, PAIR, POSITIVE, Forms, Key, Section, ValueKind, list_of, one_of, read_by
 from .toml_table import Table, is_number, shortened
 
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
@@ -112,26 +112,22 @@ def by_bearing(assembly: solver.Assembly, motions: Mapping[str, Sequence[float]]
     return {"profile": motions, "profile_arms": dict(zip(motions, arms.tolist(), strict=True))}
 
 
-def _depth(table: Table, key: Key) -> float | None:
-    depth: float | None = table.number(key.name)
-    if depth is not None and abs(depth) != 1.0:
-        raise table.error(key.name, f"is {depth:g}; give 1, or -1 for a heave: the limit says how deep it gets")
+def _depth(depth: float) -> float:
+    if abs(depth) != 1.0:
+        raise ValueError(f"is {depth:g}; give 1, or -1 for a heave: the limit says how deep it gets")
     return depth
 
 
-def _points(table: Table, key: Key) -> tuple[tuple[float, float], ...] | None:
-    given = table.take(key.name)
-    if given is None:
-        return None
+def _points(given: Any) -> tuple[tuple[float, float], ...]:
     right = isinstance(given, list) and len(given) > 1
     if not right or not all(isinstance(p, list) and len(p) == 2 and all(map(is_number, p)) for p in given):
-        raise table.error(key.name, f"is {shortened(given)}; give at least two pairs [[x, s], ...]")
+        raise ValueError(f"is {shortened(given)}; give at least two pairs [[x, s], ...]")
     points = tuple(sorted((float(x), float(s)) for x, s in given))
     for (x, _), (following, _) in pairwise(points):
         if x == following:
-            raise table.error(key.name, f"has two values at x = {x:g}; give one for each x")
+            raise ValueError(f"has two values at x = {x:g}; give one for each x")
     if not any(s for _, s in points):
-        raise table.error(key.name, "are all 0; give a value other than 0")
+        raise ValueError("are all 0; give a value other than 0")
     return points
 
 
@@ -147,8 +143,8 @@ def _motions(table: Table, key: Key) -> dict[str, tuple[float, ...]] | None:
     return {name: motion if len(motion) > 2 else (*motion, 0.0) for name, motion in motions.items()}
 
 
-_DEPTH = ValueKind("1 or -1", {"enum": [1, -1]}, _depth)
-_POINTS = ValueKind("list of at least two pairs", list_of(PAIR.schema, 2), _points)
+_DEPTH = ValueKind("1 or -1", {"enum": [1, -1]}, read_by(_depth, Table.number))
+_POINTS = ValueKind("list of at least two pairs", list_of(PAIR.schema, 2), read_by(_points))
 _MOTIONS = ValueKind(
     "table of two or three numbers, in space six, by the name of a support",
     {"type": "object", "additionalProperties": list_of({"type": "number"}, 2, 6), "minProperties": 1},

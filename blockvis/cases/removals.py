@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import solver
-from blockvis.layout.names import blocks_matching, named_like
 from blockvis.text import listed, nearest
 
+from .block_at import blocks_matching, named_like
 from .key import TEXTS, Key, Section, whole
 from .toml_table import Table
 

@@ -90,11 +90,8 @@ def with_roles_by_place(layout: Layout, places: Sequence[RolePlace]) -> Layout:
             chosen &= (low <= most + near) & (high >= least - near)
         if not chosen.any() or chosen.all():
             what = "every block" if chosen.any() else "no block"
-            raise ValueError(f"{place.where} holds {what}; the drawing reaches over {_extent(axes, lows, highs)} m")
+            ends = zip(axes, lows.min(axis=0) + 0.0, highs.max(axis=0) + 0.0, strict=True)
+            extent = ", ".join(f"{axis} {low:.4g} to {high:.4g}" for axis, low, high in ends)
+            raise ValueError(f"{place.where} holds {what}; the drawing reaches over {extent} m")
         roles = [place.role if here else role for here, role in zip(chosen, roles, strict=True)]
     return replace(layout, roles=tuple(roles))
-
-
-def _extent(axes: str, lows: np.ndarray, highs: np.ndarray) -> str:
-    ends = zip(axes, lows.min(axis=0) + 0.0, highs.max(axis=0) + 0.0, strict=True)
-    return ", ".join(f"{axis} {low:.4g} to {high:.4g}" for axis, low, high in ends)

@@ -13,16 +13,18 @@ import numpy as np
 import solver
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, in_words, matches
-from blockvis.layout.names import blocks_called
 from blockvis.layout.outlines import ROUNDING
 from blockvis.text import listed, nearest, place_text
 from solver import mechanics
 from solver.mechanics import counted
 
-from .block_at import block_at, distances_to, note_outside
+from .block_at import block_at, blocks_called, distances_to, note_outside
 from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
 from .profiles import STRAIGHT
 from .toml_table import Table, shortened
+
+#: What a tie has as its table says it.
+OF_A_TIE = ("kind", "brittle", "prestress", "phase")
 
 #: Layout files whose lines may be ties.
 DRAWN_IN = (".dxf", ".svg")
@@ -176,7 +178,7 @@ def _tie(table: Table) -> TieCase:
     if values["brittle"] and values["strength"] is None:
         raise table.error("brittle", "is true, and no strength says at which force it breaks; add strength = ... [N]")
     ends = () if layer else (values["from"], values["to"])
-    own = {key: values[key] for key in ("kind", "stiffness", "area", "modulus", "brittle", "prestress", "phase")}
+    own = {key: values[key] for key in ("stiffness", "area", "modulus", *OF_A_TIE)}
     return TieCase(values["name"] or layer, ends, layer, strength=strength, where=where, **own)
 
 
@@ -269,7 +271,10 @@ def ties_of(
 
 def _in_blocks(entry: TieCase, assembly: solver.Assembly, gone: np.ndarray) -> solver.Tie:
     where = f"{entry.where} '{entry.name}'"
-    points = tuple(_place(end.point, assembly) for end in entry.ends)
+    # A drawing in the plane stands upright in space.
+    points = tuple(
+        end.point if len(end.point) == assembly.dimension else (end.point[0], 0.0, end.point[1]) for end in entry.ends
+    )
     along = np.subtract(points[0], points[1])
     length = float(np.linalg.norm(along))
     if not length > 0.0:
@@ -284,22 +289,8 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly, gone: np.ndarray) -> s
         held = "the ground" if blocks[0] is None else f"the block '{assembly.names[blocks[0]]}'"
         raise ValueError(f"{where}: both ends are in {held}, where a {entry.kind} carries nothing; join two blocks")
     stiffness = entry.stiffness or (entry.area or 0.0) * (entry.modulus or 0.0) / length
-    return solver.Tie(
-        name=entry.name,
-        blocks=(blocks[0], blocks[1]),
-        points=(points[0], points[1]),
-        stiffness=stiffness,
-        kind=entry.kind,
-        strength=entry.strength,
-        brittle=entry.brittle,
-        prestress=entry.prestress,
-        phase=entry.phase,
-    )
-
-
-def _place(point: tuple[float, ...], assembly: solver.Assembly) -> tuple[float, ...]:
-    """Give a point as many coordinates as the blocks have: a drawing in the plane stands upright in space."""
-    return point if len(point) == assembly.dimension else (point[0], 0.0, point[1])
+    own: dict[str, Any] = {key: getattr(entry, key) for key in (*OF_A_TIE, "name", "strength")}
+    return solver.Tie(blocks=(blocks[0], blocks[1]), points=(points[0], points[1]), stiffness=stiffness, **own)
 
 
 def _holding(

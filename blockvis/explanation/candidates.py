@@ -257,7 +257,9 @@ def rotation_of(
 
 def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
     """Troughs over the width of the structure, and slopes of its left and right part."""
-    low, high = _extent(ground)
+    # Between these x the structure stands on its supports.
+    x = np.concatenate([ground.assembly.outline(i)[:, 0] for i in _bearing(ground.assembly)])
+    low, high = float(x.min()), float(x.max())
     width = high - low
     centres = settings.centres or tuple(np.linspace(low, high, 5).tolist())
     inflections = settings.inflections or (width / 6.0, width / 3.0)
@@ -272,13 +274,6 @@ def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
                 if any(any(motion) for motion in motions.values()):
                     found.append(Candidate(words, motions, detail=f"from x = {hinge:.3g} m on", bends=True))
     return [one for one in found if differential(ground.assembly, scaled_motions(one)) > STRAIGHT]
-
-
-def _extent(ground: Ground) -> tuple[float, float]:
-    """Find the x between which the structure stands on its supports [m]."""
-    bearing = _bearing(ground.assembly)
-    x = np.concatenate([ground.assembly.outline(i)[:, 0] for i in bearing])
-    return float(x.min()), float(x.max())
 
 
 def trough(ground: Ground, centre: float, inflection: float, refines: str = "") -> Candidate:

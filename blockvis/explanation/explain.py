@@ -13,7 +13,7 @@ import numpy as np
 
 import solver
 from blockvis.case_files.read import case_file_text, case_of, parsed_toml
-from blockvis.cases.build import case_assembly, case_ties
+from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
 from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.kinds.kind import needs_no_crushing
@@ -106,12 +106,14 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
-        _refuse_phases(case)
+        _refuse_unknown(case)
         refuse_ties(case)
         drawn = case_assembly(case)
-        _refuse_grounded(case_ties(case, drawn), case)
         needs_no_crushing(case)
-        mechanics.check_settlement(*_any_settlement(drawn), case.controls)
+        # The blocks are checked with a settlement of every support.
+        roles = np.where(drawn.free, mechanics.FREE, mechanics.MOVING)
+        down = solver.Settlement(direction=unit_vector("down", drawn.dimension))
+        mechanics.check_settlement(drawn.with_roles(roles), () if drawn.free.all() else (down,), case.controls)
         ground = ground_of(drawn, case.explain, case.source)
         observations = read_observations(observed, ground.assembly, drawn)
     notes = [*(str(warning.message) for warning in caught), *ground.notes]
@@ -174,8 +176,11 @@ def _notes_of_frame(comparison: Comparison) -> list[str]:
     ]
 
 
-def _refuse_phases(case: Case) -> None:
-    """Raise ValueError for what happens between two settlements: one movement is followed, from the drawing on."""
+def _refuse_unknown(case: Case) -> None:
+    """Raise ValueError for what happens between two settlements, and for ties from the ground.
+
+    One movement of supports against each other is followed, from the drawing on.
+    """
     if case.removals:
         raise ValueError(
             f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
@@ -187,21 +192,16 @@ def _refuse_phases(case: Case) -> None:
                 f"{tie.where} '{tie.name}': phase is {tie.phase}, and blockvis explain follows one movement of the "
                 "supports; leave phase out, or a tie that was installed after the cracks"
             )
+        if any(end.fixed for end in tie.ends):
+            raise ValueError(
+                f"{tie.where} '{tie.name}' is held by the ground, against which blockvis explain knows no movement; "
+                "hold both ends by blocks or supports"
+            )
     for number, load in enumerate(case.loads, start=1):
         if load.phase > 1:
             raise ValueError(
                 f"{case.source}: [loads {number}] phase is {load.phase}, and blockvis explain has no settlement "
                 "before which the load begins to act; leave phase out if it acts from the start, or the load"
-            )
-
-
-def _refuse_grounded(ties: Sequence[solver.Tie], case: Case) -> None:
-    """Raise ValueError for ties from the ground: causes are movements of supports against each other alone."""
-    for tie in ties:
-        if None in tie.blocks:
-            raise ValueError(
-                f"{case.source}: [ties '{tie.name}'] is held by the ground, against which blockvis explain knows no "
-                "movement; hold both ends by blocks or supports"
             )
 
 
@@ -217,13 +217,6 @@ def read_explained(path: str | Path) -> Case:
         raise ValueError(f'{path}: explain follows settlements, but [analysis] kind is "{kind["kind"]}"; leave it out')
     values["settlement"] = values.get("settlement", {"direction": [0.0, -1.0]})
     return replace(case_of(values, path, text), settlements=(), profiles=())
-
-
-def _any_settlement(assembly: solver.Assembly) -> tuple[solver.Assembly, tuple[solver.Settlement, ...]]:
-    """Make a settlement of every support, with which the blocks are checked."""
-    roles = np.where(assembly.free, mechanics.FREE, mechanics.MOVING)
-    down = solver.Settlement(direction=unit_vector("down", assembly.dimension))
-    return assembly.with_roles(roles), () if assembly.free.all() else (down,)
 
 
 def _likeliest(causes: Sequence[Cause]) -> list[Trial]:

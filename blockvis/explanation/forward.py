@@ -80,18 +80,15 @@ class Order:
 class Run:
     """What a candidate does, for every amount."""
 
-    amounts: np.ndarray  #: (n,) array [m or rad]: of the increments in equilibrium, from 0; empty where there is none.
+    amounts: np.ndarray  #: (n,) array [m or rad]: of the increments in equilibrium, from 0, or 0 alone.
     moved: np.ndarray  #: (n, n_blocks, n_dof) array [m and rad]: displacement and rotation of each block.
     fell: bool  #: Whether it ended in a collapse.
 
     def at(self, amounts: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Interpolate values (n, ...) of the increments at amounts (m,): (m, ...) array."""
-        place = np.clip(np.searchsorted(self.amounts, amounts, side="right") - 1, 0, max(len(self.amounts) - 2, 0))
-        following = np.minimum(place + 1, len(self.amounts) - 1)
-        step = np.maximum(self.amounts[following] - self.amounts[place], 1e-300)
-        rest = np.clip((amounts - self.amounts[place]) / step, 0.0, 1.0)
-        rest = rest.reshape(-1, *[1] * (values.ndim - 1))
-        return np.asarray(values[place] * (1.0 - rest) + values[following] * rest)
+        rest, place = np.modf(np.interp(amounts, self.amounts, np.arange(len(self.amounts))))
+        before, rest = values[place.astype(int)], rest.reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray(before * (1.0 - rest) + values[np.ceil(place + rest.ravel()).astype(int)] * rest)
 
 
 def reach_of(observations: Observations, limit: float | None) -> tuple[float, float]:
@@ -175,8 +172,8 @@ def followed(order: Order) -> Run:
                 break
         else:
             fell = steps.ending.collapse is not None
-    shape = solver.Pose.initial(assembly).displacements(assembly).shape
-    return Run(np.array(amounts), np.array(moved).reshape(-1, *shape), fell)
+    nothing = solver.Pose.initial(assembly).displacements(assembly)
+    return Run(np.array(amounts or [0.0]), np.array(moved or [nothing]), fell)
 
 
 @contextmanager
@@ -199,8 +196,10 @@ def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterat
     if count < 2 or (workers is None and runs < FEWEST_FOR_PROCESSES):
         yield None
         return
-    # Processes that are forked would share the locks of this one's threads.
-    processes = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+    # Processes that are forked would share the locks of this one's threads. This one alone answers Ctrl-C of their
+    # terminal, and stops the others.
+    deaf = (signal.SIGINT, signal.SIG_IGN)
+    processes = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=signal.signal, initargs=deaf)
     before = active_children()
     try:
         yield processes
@@ -212,11 +211,6 @@ def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterat
                 child.terminate()
         raise
     processes.shutdown()
-
-
-def _ignore_interrupts() -> None:
-    """Let the first process alone answer Ctrl-C of their terminal; it stops the others."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def all_followed(orders: Sequence[Order], processes: Executor | None, progress: RunsProgress) -> list[Run]:

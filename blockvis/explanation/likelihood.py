@@ -10,13 +10,13 @@ from scipy.special import logsumexp
 
 import solver
 from blockvis.cases.block_at import distances_to
+from blockvis.results.joint_faces import corners_of, on_faces
 from blockvis.results.joints import InitialJoints, carried_faces, initial_joints
 from solver import mechanics
 
 from .candidates import Candidate, Twin
 from .forward import COLLAPSE, Run, Variant, pose_of
 from .observations import Observations
-from .places import corners_of, on_faces
 
 #: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from the fraction
 #: of the largest on within which a collapse is found.
@@ -273,12 +273,6 @@ def tried(
 ) -> Trial:
     """Compare the run of the candidate ``shared`` with the observations, at every amount up to a largest [m or rad]."""
     amounts = largest * np.geomspace(COLLAPSE, 1.0, AMOUNTS)
-    if len(run.amounts) < 2:
-        widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))
-        gaps = np.zeros((1, len(comparison.joints.rings.points)))
-        none, still = np.full(AMOUNTS, -np.inf), np.zeros((AMOUNTS, *comparison.observations.points.shape))
-        pairs = widths.astype(int)
-        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, pairs, gaps, still)
     own = amounts / twin.scale
     # At the increments the pictures are exact; between them joints open evenly.
     gaps = comparison.openings(run.moved)

@@ -7,6 +7,7 @@ import io
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,18 +17,17 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 import solver
-from blockvis.cases.block_at import distances_to
+from blockvis.cases.block_at import blocks_called, distances_to
 from blockvis.cases.profiles import pieces_named, uncut_names
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
-from blockvis.layout.names import blocks_called
+from blockvis.results.joint_faces import corners_of, on_faces
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
-from blockvis.text import files_like, nearest, place_text
+from blockvis.text import files_like, listed, nearest, place_text
 from solver.mechanics import counted
 
 from .observation_keys import COLUMNS, LENGTHS, OBSERVATION
-from .places import corners_of, on_faces
 
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
 WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
@@ -104,7 +104,10 @@ def read_observations(
     known = FORMATS.get(path.suffix.lower())
     if known is not None and not known.alone:
         return _of_drawing(path, assembly if drawn is None else drawn)
-    table = csv.reader(io.StringIO(text := _table_text(path)), delimiter=_mark_of(text))
+    text = _table_text(path)
+    # Tables of some countries have a semicolon between columns, and a comma in their numbers.
+    mark = max(",;\t", key=next(line for line in text.splitlines() if line.strip()).count)
+    table = csv.reader(io.StringIO(text), delimiter=mark)
     header = [cell.strip() for cell in next(table)]
     return _of_rows(_numbered(table, header, path), header, assembly, str(path), "line")
 
@@ -120,12 +123,6 @@ def _table_text(path: Path) -> str:
     if not text.strip():
         raise ValueError(f"{path}: is empty; its first line names the columns, for instance: joint,width [mm]")
     return text
-
-
-def _mark_of(text: str) -> str:
-    """Find the mark between columns: tables of some countries have a semicolon, and a comma in their numbers."""
-    first = next(line for line in text.splitlines() if line.strip())
-    return max(",;\t", key=first.count)
 
 
 def _numbered(table: Any, header: Sequence[str], path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -308,13 +305,6 @@ def _note_middles(found: Observations, joints: InitialJoints) -> None:
         )
 
 
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
 class _Cells(Table):
     """The cells of a row that are filled, checked by the table of columns."""
 
@@ -323,7 +313,11 @@ class _Cells(Table):
         given = {key: row.get(column.name) for key, column in columns.items()}
         # Tables that programs make have nan where a cell is empty.
         texts = {key: str(value).strip() for key, value in given.items() if value is not None and value == value}
-        cells = {key: _number(text) if key in LENGTHS else text for key, text in texts.items() if text}
+        cells: dict[str, Any] = {key: text for key, text in texts.items() if text}
+        for key in cells.keys() & set(LENGTHS):
+            # What is no number is refused by its name.
+            with suppress(ValueError):
+                cells[key] = float(cells[key])
         super().__init__(cells, where, Path())
         self.checked = OBSERVATION.read(self)
 
@@ -479,8 +473,8 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
             len(lost), "block of the case is not in it and says", "blocks of the case are not in it and say"
         )
         others = [f"'{name}'" for k, name in enumerate(layout.names) if k not in partner.values()]
-        other = f"; {len(others)} of its blocks fit none, or lie too far away ({_first(others)})" * bool(others)
-        warnings.warn(f"{path}: {missing} nothing ({_first(lost)}){other}", stacklevel=4)
+        other = f"; {len(others)} of its blocks fit none, or lie too far away ({listed(others)})" * bool(others)
+        warnings.warn(f"{path}: {missing} nothing ({listed(lost)}){other}", stacklevel=4)
     joints = initial_joints(assembly)
     opening = opening_and_slip(assembly, joints, pose)[:, 0]
     # Joints that are closed but for the rounding of the drawing's numbers would be told and drawn as cracks.
@@ -521,7 +515,7 @@ def _check_moved(moved: np.ndarray, known: list[int], assembly: solver.Assembly,
     lost = [f"'{assembly.names[k]}' {far[k]:.3g} m" for k in known if far[k] > most]
     if lost:
         raise ValueError(
-            f"{path}: puts {_first(lost)} from where the case draws it; check names that are swapped, the origin and "
+            f"{path}: puts {listed(lost)} from where the case draws it; check names that are swapped, the origin and "
             "the unit"
         )
     # Blocks that still stand have moved by the shortest ways to where they lie; those with swapped names have not.
@@ -530,11 +524,7 @@ def _check_moved(moved: np.ndarray, known: list[int], assembly: solver.Assembly,
     names = [assembly.names[k] for k in known]
     swapped = [f"'{names[k]}' where '{names[own]}' lies" for k, own in enumerate(owners.tolist()) if k != own]
     if swapped:
-        raise ValueError(f"{path}: puts {_first(swapped)} in the case; check names that are swapped")
-
-
-def _first(words: Sequence[str]) -> str:
-    return ", ".join(words[:6]) + (" ..." if len(words) > 6 else "")
+        raise ValueError(f"{path}: puts {listed(swapped)} in the case; check names that are swapped")
 
 
 def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from blockvis.text import place_text
 from solver.mechanics import counted
 
-from .observations import LEAST_WIDTH, Observations
+from .observations import LEAST_WIDTH
 
 if TYPE_CHECKING:
     from .ranking import Cause, Measurement
@@ -145,59 +146,96 @@ def fall_texts(found: Explanation) -> list[str]:
     ]
 
 
+@dataclass(frozen=True)
+class Reading:
+    """A width or displacement that was observed, beside what the first two causes make there, in mm."""
+
+    place: str
+    about: Mapping[str, Any]  #: Where it is, as explain.json has it.
+    key: str  #: Of explain.json: "width_mm" or "displacement_mm".
+    observed: Any  #: A number, of a displacement a list of them.
+    computed: list[Any]
+    uncertainty: float
+    unexplained: bool  #: Whether the first cause does not make it,
+    by_none: bool  #: and no candidate does.
+
+
+def readings(found: Explanation) -> tuple[list[Reading], list[Reading]]:
+    """List the widths and the displacements that were observed."""
+    given, causes = found.observations, found.causes[:2]
+    widths = [
+        Reading(
+            label,
+            {"place": label} | dict(zip("xyz", given.places[k].tolist(), strict=False)),
+            "width_mm",
+            _mm(given.widths[k]),
+            [_mm(cause.best.widths[cause.at][k]) for cause in causes],
+            _mm(given.uncertainties[k]),
+            k in found.unexplained,
+            k in found.made_by_none,
+        )
+        for k, label in enumerate(given.labels)
+    ]
+    points = [
+        Reading(
+            f"{block} at {place_text(given.points[k], 3)} m",
+            {"block": block} | dict(zip("xyz", given.points[k].tolist(), strict=False)),
+            "displacement_mm",
+            _mm(given.displacements[k]),
+            [_mm(cause.best.displacements[cause.at][k]) for cause in causes],
+            _mm(given.point_uncertainties[k]),
+            k in found.unexplained_points,
+            k in found.points_made_by_none,
+        )
+        for k, block in enumerate(given.blocks)
+    ]
+    return widths, points
+
+
 def unexplained_texts(found: Explanation) -> list[str]:
     """Say which observations the best cause, or every candidate, leaves unexplained."""
-    given = found.observations
-    first = "the first cause does not make it"
-    said = [
-        (f"{width_text(given.widths[k])} mm at {given.labels[k]}", first, k in found.made_by_none)
-        if given.widths[k] > 0.0
-        else (f"closed at {given.labels[k]}", "the first cause opens it", False)
-        for k in found.unexplained
-    ]
-    said += [
-        (f"{vector_text(given.displacements[k])} mm of {point_text(given, k)}", first, k in found.points_made_by_none)
-        for k in found.unexplained_points
-    ]
-    return [f"unexplained: {what}; {'no candidate makes it' if by_none else why}" for what, why, by_none in said]
+    lines = []
+    for one in (one for several in readings(found) for one in several if one.unexplained):
+        told, why = f"{mm_text(one.observed)} mm at {one.place}", "the first cause does not make it"
+        if isinstance(one.observed, list):
+            told = f"{mm_text(one.observed)} mm of {one.place}"
+        elif not one.observed:
+            told, why = f"closed at {one.place}", "the first cause opens it"
+        lines.append(f"unexplained: {told}; {'no candidate makes it' if one.by_none else why}")
+    return lines
 
 
-def point_text(given: Observations, k: int) -> str:
-    """Name a displaced point by its block and place."""
-    return f"{given.blocks[k]} at {place_text(given.points[k], 3)} m"
-
-
-def vector_text(value: Iterable[float]) -> str:
-    """Write a displacement [m] in mm."""
-    return place_text((1e3 * part for part in value), 3)
+def mm_text(value: float | list[float]) -> str:
+    """Write a width, or a displacement, in mm."""
+    return place_text(value, 3) if isinstance(value, list) else width_text(1e-3 * value)
 
 
 def values_of(found: Explanation) -> dict[str, Any]:
     """Make what explain.json holds: lengths in m, angles in rad, widths in mm where the key says so."""
-    given = found.observations
-    settings = found.case.explain
+    settings, (widths, points) = found.case.explain, readings(found)
     return {
         "verdict": verdict(found),
         "causes": [_cause_values(cause) for cause in found.causes],
         "cannot_tell_apart": [cause.name for cause in found.alike] if len(found.alike) > 1 else [],
         "unexplained": [
-            {
-                "place": given.labels[k],
-                "width_mm": _mm(given.widths[k]),
-                "made_by_no_candidate": k in found.made_by_none,
-            }
-            for k in found.unexplained
-        ]
-        + [
-            {
-                "place": point_text(given, k),
-                "displacement_mm": list(map(_mm, given.displacements[k])),
-                "made_by_no_candidate": k in found.points_made_by_none,
-            }
-            for k in found.unexplained_points
+            {"place": one.place, one.key: one.observed, "made_by_no_candidate": one.by_none}
+            for one in (*widths, *points)
+            if one.unexplained
         ],
         "next_measurement": _measurement_values(found.next_measurement),
-        "observations": {"source": given.source, "widths": _width_values(found), "points": _point_values(found)},
+        "observations": {
+            "source": found.observations.source,
+            "widths": [
+                {
+                    **one.about,
+                    one.key: one.observed,
+                    "uncertainty_mm": one.uncertainty,
+                    "computed_mm": one.computed,
+                }
+                for one in widths
+            ],
+            "points": [{**one.about, one.key: one.observed, "computed_mm": one.computed} for one in points],
+        },
         "assumed": {
             "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike, "
             "stones heavier towards the left or right alike",
@@ -210,35 +248,6 @@ def values_of(found: Explanation) -> dict[str, Any]:
         "notes": list(found.notes),
         "case": found.case.text,
     }
-
-
-def _width_values(found: Explanation) -> list[dict[str, Any]]:
-    given = found.observations
-    computed = [cause.best.widths[cause.at] for cause in found.causes[:2]]
-    return [
-        {
-            "place": given.labels[k],
-            **_coordinates(given.places[k]),
-            "width_mm": _mm(given.widths[k]),
-            "uncertainty_mm": _mm(given.uncertainties[k]),
-            "computed_mm": [_mm(widths[k]) for widths in computed],
-        }
-        for k in range(len(given.widths))
-    ]
-
-
-def _point_values(found: Explanation) -> list[dict[str, Any]]:
-    given = found.observations
-    computed = [cause.best.displacements[cause.at] for cause in found.causes[:2]]
-    return [
-        {
-            "block": given.blocks[k],
-            **_coordinates(given.points[k]),
-            "displacement_mm": list(map(_mm, given.displacements[k])),
-            "computed_mm": [list(map(_mm, moved[k])) for moved in computed],
-        }
-        for k in range(len(given.points))
-    ]
 
 
 def _cause_values(cause: Cause) -> dict[str, Any]:
@@ -269,16 +278,12 @@ def _measurement_values(measurement: Measurement | None) -> dict[str, Any] | Non
         return None
     return {
         "joint": measurement.name,
-        **_coordinates(measurement.place),
+        **dict(zip("xyz", measurement.place, strict=False)),
         "expected_mm": {name: _mm(width) for name, width in measurement.widths},
         "deviations": round(measurement.deviations, 3),
     }
 
 
-def _coordinates(place: Iterable[float]) -> dict[str, float]:
-    return {axis: float(value) for axis, value in zip("xyz", place, strict=False)}
-
-
-def _mm(length: float | np.floating[Any]) -> float:
-    value = float(length)
-    return round(1e3 * value, 4) + 0.0 if math.isfinite(value) else value
+def _mm(length: Any) -> Any:
+    """Write a length, or a list of them, in mm, with four decimals where it is finite."""
+    return (np.round(1e3 * np.asarray(length, dtype=float), 4) + 0.0).tolist()

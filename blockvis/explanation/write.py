@@ -22,14 +22,13 @@ from .words import (
     cause_text,
     fall_texts,
     measurement_text,
+    mm_text,
     percent,
-    point_text,
     range_text,
+    readings,
     unexplained_texts,
     values_of,
-    vector_text,
     verdict,
-    width_text,
 )
 
 if TYPE_CHECKING:
@@ -68,7 +67,6 @@ def explanation_html(found: Explanation, picture: bytes) -> str:
         or "<li>The first cause makes all open joints and points, within what observations and model leave open.</li>",
         measurement=html.escape(measurement_text(found)),
         observations=_observations(found),
-        points=_points(found),
         assumed="".join(f"<li>{html.escape(text)}</li>" for text in _assumed(found)),
         case=html.escape(found.case.text or "no case file: explained from Python"),
     )
@@ -104,45 +102,27 @@ def _alike(found: Explanation) -> str:
 
 
 def _observations(found: Explanation) -> str:
-    given = found.observations
-    if not len(given.widths):
-        return ""
-    best = found.causes[:2]
-    order = sorted(range(len(given.widths)), key=lambda k: -given.widths[k])
-    rows = []
-    for k in order[:MOST_OBSERVATIONS]:
-        width = "closed" if given.widths[k] == 0.0 else width_text(given.widths[k])
-        computed = [width_text(cause.best.widths[cause.at][k]) for cause in best]
-        strange = _strange(k in found.unexplained, k in found.made_by_none)
-        rows.append((given.labels[k], width, f"{1e3 * given.uncertainties[k]:.2g}", *computed, strange))
-    return _compared("Widths", ("joint or place", "observed, mm", "± mm"), rows, len(best))
-
-
-def _compared(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], causes: int) -> str:
-    """Write a table of what was observed beside what so many causes make, and what is strange."""
-    computed = (f"cause {n}, mm" for n in range(1, causes + 1))
-    return f"<h2>{title}</h2>" + _table((*header, *computed, ""), rows)
-
-
-def _points(found: Explanation) -> str:
-    given = found.observations
-    if not len(given.points):
-        return ""
-    best = found.causes[:2]
-    rows = [
-        (
-            point_text(given, k),
-            vector_text(given.displacements[k]),
-            *(vector_text(cause.best.displacements[cause.at, k]) for cause in best),
-            _strange(k in found.unexplained_points, k in found.points_made_by_none),
-        )
-        for k in range(min(len(given.points), MOST_OBSERVATIONS))
-    ]
-    return _compared("Displaced points", ("point", "observed, mm"), rows, len(best))
-
-
-def _strange(unexplained: bool, by_none: bool) -> str:
-    return "no candidate" if by_none else "unexplained" if unexplained else ""
+    """Write tables of what was observed beside what the first causes make, the widest first, and what is strange."""
+    widths, points = readings(found)
+    tables = []
+    for title, place, some in (
+        ("Widths", "joint or place", sorted(widths, key=lambda one: -one.observed)),
+        ("Displaced points", "point", points),
+    ):
+        rows = [
+            (
+                one.place,
+                mm_text(one.observed) if one.observed else "closed",
+                f"{one.uncertainty:.2g}",
+                *map(mm_text, one.computed),
+                "no candidate" if one.by_none else "unexplained" if one.unexplained else "",
+            )
+            for one in some[:MOST_OBSERVATIONS]
+        ]
+        computed = (f"cause {n}, mm" for n in range(1, len(found.causes[:2]) + 1))
+        if rows:
+            tables.append(f"<h2>{title}</h2>" + _table((place, "observed, mm", "± mm", *computed, ""), rows))
+    return "".join(tables)
 
 
 def _assumed(found: Explanation) -> list[str]:

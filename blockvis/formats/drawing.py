@@ -10,9 +10,8 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from blockvis.layout.block_table import moved_notes, with_rows
-from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut
+from blockvis.layout.left_out import Choice, LeftOut
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import around_hole, drawing_plane, spread_of
 from solver.mechanics import counted

@@ -22,9 +22,8 @@ from ezdxf.path import add_spline, make_path
 from scipy import interpolate
 
 from blockvis.layout.block_table import layer_of, on_layer, rows_of
-from blockvis.layout.choice import look_of
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import passed_over
+from blockvis.layout.left_out import look_of, passed_over
 from blockvis.layout.notes import CHANGED, Note, kind_of
 from blockvis.layout.outlines import ROUNDING, chords_of, filled
 from blockvis.layout.units import metres_per

@@ -21,13 +21,12 @@ from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import without_collinear
 from blockvis.layout.refusal import Refused, carrying
-from blockvis.layout.remedies import deep_overlaps, proposed_ignore
+from blockvis.layout.remedies import proposed_ignore
 from blockvis.layout.repair import DeepOverlap
-from blockvis.layout.selection import noted, sorted_out, without_ignored
+from blockvis.layout.selection import checked_window, noted, sorted_out, within_window, without_ignored
 from blockvis.layout.unfilled import walls_to_fill
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
-from blockvis.layout.window import checked_window, within_window
 from blockvis.system.atomic_files import atomic_file, write_atomic
 from solver import mechanics
 
@@ -428,8 +427,7 @@ def inspect(
     chosen |= image
     layout = read_layout(path, ignore=ignore, **chosen)
     found = inspected(layout)
-    deep = [(i, j) for i, j, depth in found.overlapping if depth > found.overlap_tolerance]
-    return replace(found, remedy=overlap_remedy(layout, ignore, deep, **chosen)) if deep else found
+    return replace(found, remedy=overlap_remedy(layout, ignore, found.deep, **chosen)) if found.deep else found
 
 
 def overlap_remedy(
@@ -442,7 +440,7 @@ def overlap_remedy(
     if walls_to_fill(layout):
         return ""
     before = (ignore,) if isinstance(ignore, str) else tuple(ignore)
-    chosen, deep = {**chosen, "unit": layout.unit}, deep_overlaps(layout) if deep is None else deep
+    chosen, deep = {**chosen, "unit": layout.unit}, inspected(layout).deep if deep is None else deep
     return proposed_ignore(layout, deep, lambda more: read_layout(layout.source, ignore=(*before, *more), **chosen))
 
 

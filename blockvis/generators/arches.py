@@ -61,10 +61,8 @@ def arch(
     half = math.radians(embrace) / 2.0
     angles = np.linspace(math.pi / 2 + half, math.pi / 2 - half, voussoirs + 1)
     thickness = thickness_ratio * radius
-    inner, outer = radius - thickness / 2.0, radius + thickness / 2.0
-    bearings = radial_joints(inner - thickness / 2.0, outer + thickness / 2.0, angles[[0, -1]])
-    outlines = voussoir_outlines(radial_joints(inner, outer, angles))
-    return _on_springers(outlines, bearings, angles, thickness, density, depth)
+    joints = radial_joints(radius - thickness / 2.0, radius + thickness / 2.0, angles)
+    return _on_springers(voussoir_outlines(joints), joints, angles, thickness, density, depth)
 
 
 def segmental_arch(
@@ -101,7 +99,7 @@ def segmental_arch(
     'voussoir 5'
     """
     joints, angles = segmental_joints(span, rise, thickness, voussoirs)
-    return _on_springers(voussoir_outlines(joints), _bearings(joints), angles, thickness, density, depth)
+    return _on_springers(voussoir_outlines(joints), joints, angles, thickness, density, depth)
 
 
 def pointed_arch(
@@ -158,7 +156,7 @@ def pointed_arch(
         outlines = voussoir_outlines(joints)
         keystone = [left[-1, 0], left[-1, 1], apex[1], right[0, 1], right[0, 0], apex[0]]
         outlines[n // 2] = without_collinear(np.array(keystone), 1e-9)
-    return _on_springers(outlines, _bearings(joints), np.array([math.pi, 0.0]), thickness, density, depth)
+    return _on_springers(outlines, joints, np.array([math.pi, 0.0]), thickness, density, depth)
 
 
 def basket_handle_arch(
@@ -217,7 +215,7 @@ def basket_handle_arch(
     direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     radial = np.stack([radii, radii + thickness], axis=1)
     joints = centres[arc][:, None, :] + radial[:, :, None] * direction[:, None, :]
-    return _on_springers(voussoir_outlines(joints), _bearings(joints), angles, thickness, density, depth)
+    return _on_springers(voussoir_outlines(joints), joints, angles, thickness, density, depth)
 
 
 def radial_joints(inner: float, outer: float, angles: np.ndarray) -> np.ndarray:
@@ -266,21 +264,16 @@ def voussoir_outlines(joints: np.ndarray) -> list[np.ndarray]:
     return [np.array([a[0], a[1], b[1], b[0]]) for a, b in pairwise(joints)]
 
 
-def _bearings(joints: np.ndarray) -> np.ndarray:
-    """(2, 2, 2) array [m]: the first and the last joint, lengthened by half the arch's thickness at either end."""
-    springing = joints[[0, -1]]
-    half = (springing[:, 1] - springing[:, 0]) / 2.0
-    return springing + np.stack([-half, half], axis=1)
-
-
 def _on_springers(
-    outlines: list[np.ndarray], bearings: np.ndarray, angles: np.ndarray, thickness: float, density: float, depth: float
+    outlines: list[np.ndarray], joints: np.ndarray, angles: np.ndarray, thickness: float, density: float, depth: float
 ) -> solver.Assembly:
     """Put an arch between a fixed springer on the left and a moving one on the right, twice its thickness deep."""
     springers = []
     sides = (("left springer", mechanics.FIXED, 0, 1.0), ("right springer", mechanics.MOVING, -1, -1.0))
     for name, role, end, sense in sides:
-        joint, angle = bearings[end], angles[end]
+        (inner, outer), angle = joints[end], angles[end]
+        # Half of its thickness longer at either end.
+        joint = np.array([inner, outer]) + np.outer([-0.5, 0.5], outer - inner)
         away = 2.0 * thickness * sense * np.array([-math.sin(angle), math.cos(angle)])
         springers.append((name, role, np.array([joint[0], joint[1], joint[1] + away, joint[0] + away])))
     free = [(f"voussoir {i}", outline) for i, outline in enumerate(outlines, start=1)]

@@ -14,12 +14,10 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import largest_piece, pieces_of, without_collinear
 from solver.mechanics import counted
 
-from .bonds import BRICKWORK
-from .bricks import LOWEST_BRICK, NARROWEST, places_in
+from .bricks import LOWEST_BRICK, NARROWEST, in_simple_pieces, places_in, without_slivers
 from .dimensions import MOST_BLOCKS, above_zero, at_least_zero, choice, whole
 from .heads import HEADS, LESS, Units, head_of, top_of
-from .patterns import LEANS, PATTERNS, bedded, coursed, rubble
-from .slivers import in_simple_pieces, without_slivers
+from .patterns import BRICKWORK, LEANS, PATTERNS, bedded, coursed, rubble
 
 #: What is smaller than this fraction of a brick and has no brick beside it is joined to a head.
 CRUMB = 0.1
@@ -391,11 +389,10 @@ def _laid(
         is_complete += [part.area > (1.0 - 1e-6) * unit.area for part in parts]
     if random:
         pieces = bedded(pieces, rest)
-
-    def too_small(shape: shapely.Polygon, piece: int) -> bool:
-        return not is_complete[piece] and _is_sliver(shape, length, height)
-
-    return _numbered([shape for shape, _ in without_slivers(pieces, too_small, height, grid)], pattern)
+    joined = without_slivers(
+        pieces, lambda shape, piece: not is_complete[piece] and _is_sliver(shape, length, height), height, grid
+    )
+    return _numbered([shape for shape, _ in joined], pattern)
 
 
 def _numbered(joined: Sequence[shapely.Polygon], pattern: Pattern) -> list[tuple[str, shapely.Polygon]]:
@@ -438,12 +435,9 @@ def _with_crumbs(
 ) -> list[tuple[str, shapely.Polygon]]:
     """Join what is left between heads and openings, a crumb of a brick, to a head or quoin; drop dust."""
     length, height = pattern.module
-    every = [*laid, *others]
-
-    def is_crumb(shape: shapely.Polygon, piece: int) -> bool:
-        return piece < len(laid) and shape.area < CRUMB * length * height
-
-    joined = without_slivers([shape for _, shape in every], is_crumb, height, grid)
+    every, crumb = [*laid, *others], CRUMB * length * height
+    shapes = [shape for _, shape in every]
+    joined = without_slivers(shapes, lambda shape, piece: piece < len(laid) and shape.area < crumb, height, grid)
     return [(every[piece][0], shape) for shape, piece in joined if shape.area > DUST * length * height]
 
 

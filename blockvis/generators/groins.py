@@ -136,14 +136,19 @@ def _crossing(arc: _Arc, width: float, stone: float, bonded: bool) -> list[tuple
         cuts = _cuts(edge, length, course, reach + SHORTEST_ARM * length)
         for quarter in range(4):
             stones += _on_diagonal(f"groin {quarter + 1}-{course}", section, cuts[0], quarter, bonded)
-            stones += _in_web(quarter, (course, arc.courses + 1 - course), section, cuts)
+            for k, (start, end) in enumerate(pairwise(cuts), start=1):
+                # On either side of the web, between the diagonals and the free edge.
+                for number, side in ((course, 1.0), (arc.courses + 1 - course, -1.0)):
+                    solid = _along_y(section * [side, 1.0], start, end)
+                    stones.append((f"web {quarter + 1}-{number}-{k}", _turned(solid, quarter)))
     if arc.crown is not None:
         course = len(arc.sections) + 1
         stones.append(("keystone", _square(arc.crown)))
         cuts = _cuts(edge, length, course, float(arc.crown[:, 0].max()) + SHORTEST_ARM * length)
         for quarter in range(4):
-            for k, (start, end) in enumerate(zip([None, *cuts[:-1]], cuts, strict=True)):
-                solid = _across(arc.crown, start, end)
+            # The first stone begins at the keystone.
+            for k, (first, end) in enumerate(zip([np.abs(arc.crown[:, 0]), *cuts[:-1]], cuts, strict=True)):
+                solid = _along_y(arc.crown, first, end)
                 stones.append((f"web {quarter + 1}-{course}-{k + 1}", _turned(solid, quarter)))
     return stones
 
@@ -201,7 +206,7 @@ def pavilion_vault(
                 solid = _along_y(section, start, end)
                 stones.append((f"side {quarter + 1}-{course}-{k + 1}", _turned(solid, quarter)))
     stones.append(("keystone", _square(arc.crown)))
-    springer = between(_mirrored(arc.bearing, -1.0), _mirrored(arc.bearing, 1.0))
+    springer = _along_y(arc.bearing, -arc.bearing[:, 0], arc.bearing[:, 0])
     return assembled(stones, _supports("springer", springer), density=density)
 
 
@@ -253,29 +258,9 @@ def _cuts(edge: float, length: float, course: int, least: float) -> list[float]:
     return [*sorted(float(y) for y in inner if y >= least), edge]
 
 
-def _in_web(quarter: int, courses: tuple[int, int], section: np.ndarray, cuts: list[float]) -> list[tuple[str, Solid]]:
-    """Stones of a course on either side of a web, between the diagonals and the free edge."""
-    found = []
-    for k, (start, end) in enumerate(pairwise(cuts)):
-        for course, side in zip(courses, (1.0, -1.0), strict=True):
-            solid = _along_y(section * [side, 1.0], start, end)
-            found.append((f"web {quarter + 1}-{course}-{k + 1}", _turned(solid, quarter)))
-    return found
-
-
-def _along_y(section: np.ndarray, start: float, end: float) -> Solid:
+def _along_y(section: np.ndarray, start: float | np.ndarray, end: float | np.ndarray) -> Solid:
+    """Close the stone between two places along y [m], each that of the section or (4,) those of its corners."""
     return between(*(np.insert(section, 1, y, axis=1) for y in (start, end)))
-
-
-def _across(crown: np.ndarray, start: float | None, end: float) -> Solid:
-    """Stone of the crown of a web, from the keystone or from a joint on."""
-    first = np.abs(crown[:, 0]) if start is None else np.full(4, start)
-    return between(np.insert(crown, 1, first, axis=1), np.insert(crown, 1, end, axis=1))
-
-
-def _mirrored(section: np.ndarray, sign: float) -> np.ndarray:
-    """(4, 3) array [m]: a section cut along a diagonal."""
-    return np.insert(section, 1, sign * section[:, 0], axis=1)
 
 
 def _square(crown: np.ndarray) -> Solid:
@@ -292,7 +277,7 @@ def _on_diagonal(name: str, section: np.ndarray, arm: float, quarter: int, bonde
     """Make the stone of a course on a diagonal, whole or cut along it."""
     if true_or_false("bonded", bonded):
         return [(name, _turned(_corner(section, arm), quarter))]
-    one = between(_mirrored(section, 1.0), np.insert(section, 1, arm, axis=1))
+    one = _along_y(section, section[:, 0], arm)
     swapped = one[0][:, [1, 0, 2]], one[1]
     return [(f"{name} {side}", _turned(outward(*solid), quarter)) for side, solid in (("a", one), ("b", swapped))]
 
@@ -300,8 +285,7 @@ def _on_diagonal(name: str, section: np.ndarray, arm: float, quarter: int, bonde
 def _corner(section: np.ndarray, arm: float) -> Solid:
     """Join the two arms of a stone on the diagonal x = y: along y up to ``arm``, and along x."""
     n = len(section)
-    middle = _mirrored(section, 1.0)
-    first = np.insert(section, 1, arm, axis=1)
+    middle, first = (np.insert(section, 1, y, axis=1) for y in (section[:, 0], arm))
     points = np.vstack([middle, first, first[:, [1, 0, 2]]])
     faces = [list(range(n, 2 * n)), list(range(2 * n, 3 * n))[::-1]]
     for k in range(n):

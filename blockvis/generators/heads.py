@@ -60,48 +60,22 @@ class Units:
         """Depth of a ring of voussoirs, or of wedges [m]: a stone, and less of long stones over a short span."""
         return min(self.length, max(self.height, RING * span))
 
-    def level_above(self, y: float, least: float) -> float:
-        """Find the first joint of a course that lies so far above a level, or a little less."""
-        return self.height * math.ceil((y + least) / self.height - 0.4)
+    def level_above(self, y: float, least: float, share: float) -> float:
+        """Find the first joint of a course that lies so far above a level, or a little less; or go a share of that."""
+        return self.height * math.ceil((y + least) / self.height - 0.4) if share == 1.0 else y + share * least
 
 
 @dataclass(frozen=True)
 class Top:
-    """Upper edge of an opening, an (n, 2) array [m] from the left springing to the right one."""
+    """Upper edge of an opening, with its measures [m]."""
 
-    chain: np.ndarray
-
-    @property
-    def left(self) -> float:
-        """Left end of the span [m]."""
-        return float(self.chain[0, 0])
-
-    @property
-    def right(self) -> float:
-        """Right end of the span [m]."""
-        return float(self.chain[-1, 0])
-
-    @property
-    def span(self) -> float:
-        """Distance between the jambs [m]."""
-        return self.right - self.left
-
-    @property
-    def springing(self) -> float:
-        """Level of the lower end of the jambs [m]."""
-        return float(self.chain[[0, -1], 1].min())
-
-    @property
-    def crown(self) -> float:
-        """Highest level [m]."""
-        return float(self.chain[:, 1].max())
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether most of it is level."""
-        edges = np.diff(self.chain, axis=0)
-        level = np.abs(edges[:, 1]) <= 1e-3 * self.span
-        return len(self.chain) == 2 or bool(np.abs(edges[level, 0]).max(initial=0.0) > STRAIGHT * self.span)
+    chain: np.ndarray  #: (n, 2) array: from the left springing to the right one.
+    left: float
+    right: float
+    span: float
+    springing: float  #: Level of the lower end of the jambs.
+    crown: float  #: Highest level.
+    is_straight: bool  #: Whether most of it is level.
 
 
 def top_of(opening: shapely.Polygon) -> Top:
@@ -119,8 +93,12 @@ def top_of(opening: shapely.Polygon) -> Top:
         at = np.flatnonzero(side)
         ends.append(int(at[np.argmax(ring[at, 1])]))
     first, last = ends
-    ring = np.roll(ring, -first, axis=0)
-    return Top(ring[: (last - first) % len(ring) + 1][::-1])
+    chain = np.roll(ring, -first, axis=0)[: (last - first) % len(ring) + 1][::-1]
+    (left, start), (right, end) = chain[[0, -1]].tolist()
+    run, rise = np.abs(np.diff(chain, axis=0)).T
+    longest = run.max(initial=0.0, where=rise <= 1e-3 * (right - left))
+    is_straight = len(chain) == 2 or bool(longest > STRAIGHT * (right - left))
+    return Top(chain, left, right, right - left, min(start, end), float(chain[:, 1].max()), is_straight)
 
 
 def head_of(
@@ -176,15 +154,13 @@ def _tried(top: Top, kind: str, near: float, units: Units) -> Iterator[tuple[str
 
 def _lintel(top: Top, bearings: tuple[float, float], share: float, units: Units) -> shapely.Polygon:
     least = max(units.height, LINTEL * top.span)
-    level = units.level_above(top.crown, least) if share == 1.0 else top.crown + share * least
+    level = units.level_above(top.crown, least, share)
     return shapely.box(top.left - bearings[0], top.springing, top.right + bearings[1], level)
 
 
 def _wedges(top: Top, share: float, units: Units) -> list[shapely.Polygon]:
     """Wedges of a flat arch, as those of rectangular walls."""
-    deep = units.depth_of_ring(top.span)
-    level = units.level_above(top.crown, deep) if share == 1.0 else top.crown + share * deep
-    depth = level - top.springing
+    depth = units.level_above(top.crown, units.depth_of_ring(top.span), share) - top.springing
     joints = flat_joints(top.left, top.left + top.span, top.springing, depth, SKEW, odd(top.span / units.height))
     return [shapely.Polygon(outline) for outline in voussoir_outlines(joints)]
 

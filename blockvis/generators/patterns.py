@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 import shapely
 
-from .bonds import BRICKWORK, head_joints
+from blockvis.layout.joints.nearest_stone import without_short_edges
+from blockvis.layout.outlines import ring_of
+
+#: Bonds of rectangular walls.
+BONDS = ("running", "stack", "english")
+
+#: Bonds of brick that fill an outline.
+BRICKWORK = (*BONDS, "flemish", "header")
+
+#: A brick cut shorter than this fraction of its length is joined to its neighbour: a mason lays no piece shorter than a
+#: closer, a quarter of a brick.
+SHORTEST_BRICK = 0.2
 
 #: Patterns that fill an outline.
 PATTERNS = (*BRICKWORK, "ashlar", "rubble")
@@ -45,6 +56,45 @@ def coursed(kind: str, width: float, height: float, brick: tuple[float, float], 
         boxes += [shapely.box(a, course * high, b, (course + 1) * high) for a, b in pairwise(joints)]
         below = joints[1:-1]
     return boxes
+
+
+def head_joints(bond: str, course: int, width: float, brick_length: float) -> np.ndarray:
+    """Position the head joints of one course of a wall, (n,) array [m] from 0 to its width.
+
+    Even courses, from 0 at the bottom, are whole bricks (stretchers); odd ones are shifted by half a brick in running
+    bond, and in English bond are headers with a queen closer next to each end. In Flemish bond each course is a
+    stretcher and a header in turn, each header over the middle of a stretcher, with a queen closer at the left of odd
+    courses; in header bond all are headers, and odd courses begin with three quarters of a brick. A brick too short at
+    either end is joined to its neighbour.
+
+    Examples
+    --------
+    >>> head_joints("running", 1, 3.0, 1.0).tolist()
+    [0.0, 0.5, 1.5, 2.5, 3.0]
+    >>> head_joints("english", 1, 2.0, 1.0).tolist()
+    [0.0, 0.5, 0.75, 1.25, 1.5, 2.0]
+    """
+    n = int(np.ceil(2.0 * width / brick_length)) + 2
+    if bond == "flemish":
+        ends = np.array([1.0, 1.5]) if course % 2 == 0 else np.array([0.75, 1.75])
+        inside = (ends + 1.5 * np.arange(n)[:, None]).ravel() * brick_length
+        # The first header of odd courses has a queen closer at its right.
+        inside = np.append(0.5 * brick_length, inside) if course % 2 else inside
+    elif bond == "header":
+        inside = (0.5 + 0.25 * (course % 2) + 0.5 * np.arange(n)) * brick_length
+        inside = inside if course % 2 == 0 else inside[inside < width - 0.5 * brick_length]
+    elif course % 2 == 0 or bond == "stack":
+        inside = np.arange(1, n) * brick_length
+    elif bond == "running":
+        inside = (np.arange(n) + 0.5) * brick_length
+    else:
+        headers = (0.75 + 0.5 * np.arange(n)) * brick_length
+        last = width - 0.5 * brick_length
+        headers = headers[headers < last - SHORTEST_BRICK * brick_length]
+        inside = np.unique(np.concatenate([[0.5 * brick_length], headers, [last]]))
+    shortest = SHORTEST_BRICK * brick_length
+    inside = inside[(inside > shortest) & (inside < width - shortest)]
+    return np.concatenate([[0.0], inside, [width]])
 
 
 def _random_joints(random: np.random.Generator, width: float, length: float, below: np.ndarray) -> np.ndarray:
@@ -87,44 +137,17 @@ def rubble(width: float, height: float, stone: float, flatness: float, seed: int
     for _ in range(ROUNDS):
         cells = shapely.intersection(_cells(points * stretched, frame), frame)
         points = shapely.get_coordinates(shapely.centroid(cells)) / stretched
-    cells = _closed(list(shapely.intersection(_cells(points * stretched, frame), frame)), SHORT_EDGE * stone)
-    return [shapely.transform(cell, lambda xy: xy / stretched) for cell in cells]
+    rings = [ring_of(cell) for cell in shapely.intersection(_cells(points * stretched, frame), frame)]
+    corners = np.concatenate(rings)
+    # Near the rim they stay: three stones that met there would have steep joints.
+    near = shapely.dwithin(shapely.points(corners), frame.exterior, SHORT_EDGE * stone)
+    rings = without_short_edges(rings, SHORT_EDGE * stone, corners[near])
+    return [shapely.Polygon(ring / stretched) for ring in rings]
 
 
 def _cells(points: np.ndarray, frame: shapely.Polygon) -> np.ndarray:
     cells = shapely.voronoi_polygons(shapely.MultiPoint(points), extend_to=frame.buffer(frame.length), ordered=True)
     return np.array(shapely.get_parts(cells))
-
-
-def _closed(cells: list[shapely.Polygon], shortest: float) -> list[shapely.Polygon]:
-    """Close short edges between cells: both ends move to their middle, in all cells that have them."""
-    kept = list(cells)
-    places: dict[tuple[float, float], tuple[float, float]] = {}
-    frame = shapely.union_all(cells).bounds
-
-    def rim(x: float, y: float) -> bool:
-        return min(abs(x - frame[0]), abs(x - frame[2]), abs(y - frame[1]), abs(y - frame[3])) < 1e-9
-
-    def key(x: float, y: float) -> tuple[float, float]:
-        return round(x, 7), round(y, 7)
-
-    for cell in cells:
-        ring = np.array(cell.exterior.coords)
-        for a, b in pairwise(ring.tolist()):
-            ends = key(*a), key(*b)
-            if np.hypot(a[0] - b[0], a[1] - b[1]) < shortest and not any(end in places for end in ends):
-                if rim(*a) or rim(*b):
-                    continue
-                middle = ((a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0)
-                places[ends[0]] = places[ends[1]] = middle
-    for k, cell in enumerate(cells):
-        moved = [places.get(key(x, y), (x, y)) for x, y in cell.exterior.coords]
-        corners = [p for i, p in enumerate(moved[:-1]) if p != moved[i - 1 if i else -2]]
-        kept[k] = shapely.Polygon(corners) if len(corners) > 2 else shapely.Polygon()
-    right = all(cell.is_valid and cell.area > 0.0 for cell in kept)
-    whole = sum(cell.area for cell in cells)
-    fits = right and abs(shapely.union_all(kept).area - whole) + abs(sum(c.area for c in kept) - whole) < 1e-9 * whole
-    return kept if fits else cells
 
 
 def bedded(stones: list[shapely.Polygon], wall: shapely.Geometry) -> list[shapely.Polygon]:
@@ -149,7 +172,10 @@ def _joints_at_rim(rings: Sequence[np.ndarray], wall: shapely.Geometry) -> dict[
     for i, ring in enumerate(rings):
         for x, y in ring.tolist():
             at.setdefault((round(x, 9), round(y, 9)), []).append(i)
-    rim = shapely.dwithin(shapely.points(np.array(list(at))), _upright(wall), 1e-8)
+    lines = (shapely.get_coordinates(part).tolist() for part in shapely.get_parts(wall.boundary))
+    edges = chain.from_iterable(map(pairwise, lines))
+    upright = [(a, b) for a, b in edges if abs(a[0] - b[0]) < LEANS * abs(a[1] - b[1])]
+    rim = shapely.dwithin(shapely.points(np.array(list(at))), shapely.MultiLineString(upright), 1e-8)
     taken = set(map(tuple, np.round(shapely.get_coordinates(wall), 9).tolist()))
     met = zip(at.items(), rim.tolist(), strict=True)
     return {key: pair for (key, pair), on in met if on and key not in taken and len(pair) == 2}
@@ -165,12 +191,3 @@ def _levelled(ring: np.ndarray, corner: tuple[float, float]) -> tuple[float, np.
     moved = ring.copy()
     moved[k, 1] = inner[1] + np.clip(ring[k, 1] - inner[1], -most, most)
     return float(moved[k, 1]), moved
-
-
-def _upright(wall: shapely.Geometry) -> shapely.MultiLineString:
-    """Upright edges of the rim of a wall."""
-    edges = []
-    for part in shapely.get_parts(wall.boundary):
-        ends = shapely.get_coordinates(part)
-        edges += [(a, b) for a, b in pairwise(ends.tolist()) if abs(a[0] - b[0]) < LEANS * abs(a[1] - b[1])]
-    return shapely.MultiLineString(edges)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 import solver
@@ -100,17 +102,15 @@ def _extruded(
     """Extrude an arch along y, cut there in stones and springers."""
     straight = length * np.linspace(-0.5, 0.5, stones + 1)
     broken = np.unique(np.concatenate([straight[[0, -1]], (straight[1:] + straight[:-1]) / 2.0]))
+    halves = length * np.linspace(-0.5, 0.5, springers + 1)
     free: list[tuple[str, Solid]] = []
-    for course in np.flatnonzero(plane.free).tolist():
-        cuts = straight if course % 2 == 0 or stones == 1 else broken
-        for k in range(len(cuts) - 1):
-            solid = extruded(plane.outline(course), float(cuts[k]), float(cuts[k + 1]))
-            free.append((name.format(course + 1, k + 1), solid))
-    cuts = length * np.linspace(-0.5, 0.5, springers + 1)
-    supports = []
-    for side in np.flatnonzero(~plane.free).tolist():
-        for k in range(springers):
-            called = plane.names[side] + (f" {k + 1}" if springers > 1 else "")
-            solid = extruded(plane.outline(side), float(cuts[k]), float(cuts[k + 1]))
-            supports.append((called, str(plane.roles[side]), solid))
+    supports: list[tuple[str, str, Solid]] = []
+    for block, role in enumerate(plane.roles.tolist()):
+        cuts = halves if not plane.free[block] else straight if block % 2 == 0 or stones == 1 else broken
+        for k, (start, end) in enumerate(pairwise(cuts.tolist()), start=1):
+            solid = extruded(plane.outline(block), start, end)
+            if plane.free[block]:
+                free.append((name.format(block + 1, k), solid))
+            else:
+                supports.append((plane.names[block] + f" {k}" * (springers > 1), role, solid))
     return assembled(free, supports, density=density)

@@ -18,10 +18,10 @@ from solver.mechanics import counted
 
 from .arches import segmental_joints
 from .assembled import assembled
-from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, cut_bricks, places_in
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
+from .patterns import BONDS, SHORTEST_BRICK
 
 
 def wall(
@@ -303,12 +303,8 @@ def _placed(
             )
         if opening.top > height * (1.0 + 1e-9):
             raise ValueError(f"{where} ends at y = {opening.top:g} m, above the wall of {height:g} m; lower it")
-        for side, pier in (("left", opening.x), ("right", width - right)):
-            least = SHORTEST_BRICK * bond.brick_length
-            if 1e-9 * width < pier < least:
-                raise ValueError(
-                    f"{where} leaves {pier:.4g} m of wall on its {side}; leave at least {least:g} m, or nothing"
-                )
+        sides = (("on its left", opening.x), ("on its right", width - right))
+        _refuse_rest(where, sides, 1e-9 * width, SHORTEST_BRICK * bond.brick_length)
         opening = _on_joints(bond, opening)
         placed.append((opening, head_joints_of(opening)))
     return placed
@@ -340,11 +336,7 @@ def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: f
                 f"y = {high[1]:g} m, "
                 f"outside the wall of {width:g} × {height:g} m; move it, or choose another head"
             )
-        for place, rest in (("under its sill", low[1]), ("above it", height - high[1])):
-            if small < rest < least:
-                raise ValueError(
-                    f"opening {number} leaves {rest:.4g} m of wall {place}; leave at least {least:g} m, or nothing"
-                )
+        _refuse_rest(f"opening {number}", (("under its sill", low[1]), ("above it", height - high[1])), small, least)
     shapes = [shapely.Polygon(ring) for ring in rings]
     for i, j in combinations(range(len(shapes)), 2):
         shared = shapes[i].intersection(shapes[j]).area
@@ -360,6 +352,13 @@ def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: f
                     f"opening {i + 1} and opening {j + 1} leave {rest:.4g} m of wall between them, heads included; "
                     f"leave at least {max(map(abs, way)):g} m, or nothing"
                 )
+
+
+def _refuse_rest(where: str, rests: Sequence[tuple[str, float]], small: float, least: float) -> None:
+    """Refuse an opening that leaves less wall than the least [m] at some place, but for what is no wall, so small."""
+    for place, rest in rests:
+        if small < rest < least:
+            raise ValueError(f"{where} leaves {rest:.4g} m of wall {place}; leave at least {least:g} m, or nothing")
 
 
 def _ground(width: float, brick_length: float, settling: Sequence[float] | None) -> list[tuple[str, str, np.ndarray]]:

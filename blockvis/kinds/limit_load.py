@@ -24,8 +24,8 @@ from blockvis.results.about import (
     phases_of,
     unit_and_phase,
 )
+from blockvis.results.mechanism_arrays import SWING, swing_factors, swung_increment
 from blockvis.results.other_mechanisms import has_others
-from blockvis.results.swinging import SWING, swing_factors, swung_increment
 from blockvis.results.tables import csv_text, finite
 from blockvis.text import force_text
 from solver import mechanics

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.cases.block_at import block_at
+from blockvis.cases.block_at import block_at, blocks_called
 from blockvis.cases.contents import Case
 from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.formats.reading import naming
-from blockvis.layout.names import blocks_called
 from blockvis.results.about import EXACT, mechanism_text
-from blockvis.text import nearest
+from blockvis.text import beginning, nearest
 from solver import mechanics
 
 from .kind import (
@@ -68,10 +67,8 @@ class PushoverKind(AnalysisKind):
         values = CONTROL.read(table)
         # It belongs to the controls.
         del values["step_tolerance"]
-        try:
+        with beginning(f"{table.source}: [{table.where}]"):
             return solver.ControlDisplacement(**values)
-        except ValueError as error:
-            raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
     def refuse(self, settings: Any, case: Case) -> None:
         """Refuse a [control] that controls nothing."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.text import nearest
+from blockvis.text import beginning, nearest
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -21,7 +21,7 @@ from .layout import Layout
 from .notes import REPORTED, kind_of
 from .outlines import ring_width
 from .repair import DRAWN_GAP, nothing_closed, overlaps, refuse_overlaps, repaired
-from .roles import checked_role, roles_of, told_apart, twins_note
+from .roles import checked_role, roles_of, without_twins
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 from .solids import prism, width_of
@@ -93,7 +93,8 @@ def assemble(
         layout, note = as_simplified(layout, outline_tolerance)
         if note:
             warnings.warn(f"{where}: {note}", stacklevel=2)
-    layout = _with_supports(layout, supports)
+    if supports:
+        layout = layout.with_more(**vars(supports_of(supports, layout.dimension)))
     anchored = np.arange(layout.n_blocks) >= n_drawn
     of_blocks: dict[str, Any] = {
         "names": layout.names,
@@ -156,12 +157,6 @@ def _check_lengths(
         )
 
 
-def without_twins(layout: Layout, roles: Mapping[str, str]) -> tuple[Layout, str]:
-    """Drop blocks that are drawn in the place of another, and say which; "" for none."""
-    twins, kept = told_apart(layout, roles)
-    return (layout.chosen(kept), twins_note(layout, twins, kept)) if twins else (layout, "")
-
-
 def _left_overlaps(assembly: solver.Assembly, accepted: float) -> str:
     """Refuse blocks in space that overlap by more than is accepted [m], and tell which overlap by less."""
     found = overlaps(assembly, min(accepted, DRAWN_GAP * float(assembly.widths.min())))
@@ -211,14 +206,6 @@ def _filled(given: np.ndarray | None, default: float, n: int) -> np.ndarray:
     return np.where(np.isnan(given), float(default), given)
 
 
-def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Layout:
-    if not supports:
-        return layout
-    laid = supports_of(supports, layout.dimension)
-    of_blocks = {key: getattr(laid, key) for key in ("names", "roles", "materials", "density", "thickness")}
-    return layout.with_more(laid.blocks, **of_blocks)
-
-
 def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout:
     """Make a layout of supports that a drawing does not contain, as :func:`assemble` takes them.
 
@@ -261,11 +248,9 @@ def _outline_of(support: Mapping[str, Any], name: str) -> np.ndarray:
         raise ValueError(f"support '{name}': its outline must be corners [[x, y], ...] in m; {error}") from None
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise ValueError(f"support '{name}' needs at least three corners [x, y]; its shape is {outline.shape}")
-    try:
-        # As a block by itself, before it is one of many whose message names no support.
+    # As a block by itself, before it is one of many whose message names no support.
+    with beginning(f"support '{name}': outline:"):
         solver.Assembly.from_outlines([outline], names=[name])
-    except ValueError as error:
-        raise ValueError(f"support '{name}': outline: {error}") from None
     return outline
 
 

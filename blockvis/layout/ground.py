@@ -19,9 +19,9 @@ from .assemble import as_simplified
 from .facing import facing_tolerance
 from .inspect import Inspection
 from .layout import Layout
-from .outlines import ROUNDING, largest_piece, pieces_of, rectangle, ring_of, touching, without_collinear
+from .outlines import ROUNDING, largest_piece, pieces_of, rectangle, ring_of, touching, uncovered, without_collinear
 from .repair import repaired
-from .solids import size_of
+from .solids import plan_beyond, size_of
 
 #: Blocks of the lowest course have their bottom within this fraction of the median height of the lowest.
 COURSE = 0.5
@@ -211,7 +211,8 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
         if low[k, 1] > low[order[0], 1] + COURSE * height and not arch:
             break
         edges = _lower_edges(outlines[k])
-        steep = _slope(edges, float(high[k, 0] - low[k, 0])) > (LEVEL if arch else SLOPE)
+        run, rise = np.abs(edges[-1] - edges[0]).tolist()
+        steep = run <= NARROW * (high[k, 0] - low[k, 0]) or rise > (LEVEL if arch else SLOPE) * run
         lower = [j for j in beside[k] if low[j, 1] < low[k, 1]]
         if steep and springers.intersection(lower):
             # It rests on a springer, or on a voussoir that does.
@@ -289,12 +290,6 @@ def _lower_edges(points: np.ndarray) -> np.ndarray:
     return chain[gentle[0] : gentle[-1] + 2] if len(gentle) else chain[[chain[:, 1].argmin()]]
 
 
-def _slope(bed: np.ndarray, width: float) -> float:
-    """Slope of a bed from end to end, infinite for a point or an edge."""
-    run, rise = np.abs(bed[-1] - bed[0]).tolist()
-    return rise / run if run > NARROW * width else np.inf
-
-
 def _beneath(bed: np.ndarray, shapes: np.ndarray) -> list[tuple[float, float]]:
     """Find the intervals of x of what lies beneath a bed, as the toes of stones that themselves lie higher."""
     if len(bed) < 2:
@@ -308,12 +303,7 @@ def _beneath(bed: np.ndarray, shapes: np.ndarray) -> list[tuple[float, float]]:
 def _widest_free(bed: np.ndarray, taken: Iterable[tuple[float, float]]) -> np.ndarray | None:
     """Cut the widest part of a bed that no interval of x takes; None where less is left than a foot needs."""
     start, end = float(bed[0, 0]), float(bed[-1, 0])
-    free, reached = [], start
-    for low, high in sorted(taken):
-        free.append((reached, min(float(low), end)))
-        reached = max(reached, float(high))
-    free.append((reached, end))
-    left, right = max(free, key=lambda part: part[1] - part[0])
+    left, right = max(uncovered(start, end, taken), key=lambda part: part[1] - part[0], default=(start, start))
     if right - left < EXPOSED * (end - start) or right <= left:
         return None
     inner = bed[(bed[:, 0] > left) & (bed[:, 0] < right)]
@@ -398,12 +388,6 @@ def _above(ring: np.ndarray, level: float) -> shapely.Geometry:
     return shapely.union_all(shapely.convex_hull(shapely.multipoints(np.concatenate([ends, raised], axis=1))))
 
 
-def _bed(points: np.ndarray, level: float, least: float) -> np.ndarray | None:
-    """(n, 2) array: hull in plan of the corners of a block within ``level`` of its lowest; None of less area [m²]."""
-    face = shapely.MultiPoint(points[points[:, 2] <= points[:, 2].min() + level][:, :2]).convex_hull
-    return shapely.get_coordinates(face)[:-1] if face.area > least else None
-
-
 def _feet_in_space(found: Inspection) -> list[_Foot]:
     """Find the blocks of the lowest course in space, and the bottom faces they lie on in plan."""
     blocks = found.kept.tolist()
@@ -422,7 +406,9 @@ def _feet_in_space(found: Inspection) -> list[_Foot]:
         covered = plans[k].intersection(shapely.union_all(plans[lower])).area if lower else 0.0
         if covered > (1.0 - EXPOSED) * plans[k].area:
             continue
-        bed = _bed(corners[k], LEVEL * height[k], NARROW * plans[k].area)
+        flat = corners[k][corners[k][:, 2] <= low[k, 2] + LEVEL * height[k]]
+        face = shapely.MultiPoint(flat[:, :2]).convex_hull
+        bed = shapely.get_coordinates(face)[:-1] if face.area > NARROW * plans[k].area else None
         rests = (low[lower, 2] < low[k, 2] - 0.5 * near).any()
         # Without a bed it may rest on a springer.
         if bed is not None or not (rests or not _can_be_named(found, blocks[k])):
@@ -468,19 +454,12 @@ def _pads(found: Inspection, beds: Sequence[_Foot], split: _Split) -> list[Mappi
         most, plan = STAND_OFF * math.sqrt(bed.area) + opening, bed
         for j in np.flatnonzero((low < levels[1] - ROUNDING * thick) & (high > levels[0])):
             off = min(levels[1] - low[j] + opening, most)
-            plan = plan.difference(_below(corners[j], levels[1]).buffer(off, join_style="mitre"))
+            below = plan_beyond(corners[j], levels[1] - corners[j][:, 2])
+            plan = plan.difference(below.buffer(off, join_style="mitre"))
         # Of what is all around the bed, as no hull can be, the run tells that it overlaps.
         outline = ring_of(largest_piece(plan if plan.area > EXPOSED * bed.area else bed))
         pads.append({"name": f"ground {number}", "role": role, "outline": outline.tolist(), "levels": levels})
     return pads
-
-
-def _below(points: np.ndarray, level: float) -> shapely.Geometry:
-    """Hull in plan of what of the hull of (n, 3) points is below a level [m]."""
-    low, high = points[points[:, 2] <= level, None], points[None, points[:, 2] > level]
-    share = (level - low[..., 2:]) / (high[..., 2:] - low[..., 2:])
-    section = (1.0 - share) * low + share * high
-    return shapely.MultiPoint([*low[:, 0, :2], *section.reshape(-1, 3)[:, :2]]).convex_hull
 
 
 def _split(feet: Sequence[_Foot], opening: float) -> _Split:
@@ -489,11 +468,8 @@ def _split(feet: Sequence[_Foot], opening: float) -> _Split:
     for axis in range(len(feet[0].low)):
         spans = sorted((float(foot.low[axis]), float(foot.high[axis])) for foot in feet)
         left, right = spans[0][0], max(end for _, end in spans)
-        middle, gaps, reached = 0.5 * (left + right), [], spans[0][1]
-        for start, end in spans[1:]:
-            if start > reached + opening:
-                gaps.append((reached, start))
-            reached = max(reached, end)
+        middle = 0.5 * (left + right)
+        gaps = [(start, end) for start, end in uncovered(left, right, spans) if end - start > opening]
         near = min(gaps, key=lambda gap: abs(0.5 * sum(gap) - middle), default=(middle, middle))
         # Of two gaps that are as wide but for rounding, or of none, the first axis has it.
         found.append((near[1] - near[0], right - left, _Split(axis, 0.5 * sum(near))))

@@ -72,6 +72,11 @@ class Inspection:
     refused: str = ""  #: Why a run would refuse the blocks, or "".
     remedy: str = ""  #: What to leave out where they overlap, or "".
 
+    @property
+    def deep(self) -> list[tuple[int, int]]:
+        """Pairs of blocks of which a run refuses the overlap."""
+        return [(i, j) for i, j, depth in self.overlapping if depth > self.overlap_tolerance]
+
     def __str__(self) -> str:
         """Write the measurements as lines of a table."""
         layout, in_space = self.layout, self.layout.dimension == 3

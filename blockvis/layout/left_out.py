@@ -1,4 +1,7 @@
-"""What a drawing holds beside its blocks: what it was, where, and why it is left out; one line of words per kind."""
+"""What a drawing holds beside its blocks: what it was, where, and why it is left out; and what a caller asks for.
+
+That is by layer, group, material and name, or by kind of entity and colour.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +36,15 @@ KINDS = {
     "asked line": ("line, as asked for", "lines, as asked for"),
 }
 
+#: Kinds of entities of drawings, as they can be asked for.
+ENTITIES = (
+    "arc", "circle", "ellipse", "face", "hatch", "line", "path", "polygon", "polyline", "rect", "solid", "spline",
+    "text",
+)  # fmt: skip
+
+#: What formats call them, where it is something else.
+_ALSO = {"lwpolyline": "polyline", "mpolygon": "hatch", "mtext": "text", "trace": "solid", "3dface": "solid"}
+
 #: Layers of ties, whose lines are members where a case says so.
 TIES = re.compile(r"\b(ties?|tie.?(rod|bar)s?|tirant[eis]*|caten[ae]|tensores|zug(anker|stangen?))\b", re.IGNORECASE)
 
@@ -46,7 +58,7 @@ class LeftOut:
 
     ``points`` (n, 2) [m] are its outline if it is closed, else line; inside a format's reader in the unit of the file,
     as its holes. Its message refuses the file where no block is left, and if ``serious`` unless the caller asks to
-    leave it out. ``looks`` are kind of entity and colour; see :mod:`blockvis.layout.choice`.
+    leave it out. ``looks`` are kind of entity and colour; see :func:`look_of`.
     """
 
     kind: str
@@ -117,3 +129,33 @@ def passed_over(counts: Mapping[str, int], words: str = "skipped") -> list[Note]
 def matches(labels: Iterable[str], patterns: Sequence[str]) -> bool:
     """Whether a label is one of the patterns, or fits one."""
     return any(label == pattern or fnmatch.fnmatchcase(label, pattern) for label in labels for pattern in patterns)
+
+
+def look_of(word: str) -> str:
+    """Write a kind of entity or a colour as drawings are compared by it.
+
+    Examples
+    --------
+    >>> look_of("LWPOLYLINE"), look_of("#F00")
+    ('polyline', '#ff0000')
+    """
+    word = word.strip().lower()
+    if re.fullmatch(r"#[0-9a-f]{3}", word):
+        return "#" + "".join(2 * digit for digit in word[1:])
+    return _ALSO.get(word, word)
+
+
+class Choice:
+    """Patterns, as a caller gives them: of names, and kinds and colours where no name is meant.
+
+    A pattern that fits one of the names, those of all layers, groups, materials and blocks, means names only.
+    """
+
+    def __init__(self, patterns: Sequence[str], names: Iterable[str]) -> None:
+        names = set(names)
+        self.patterns = tuple(pattern for pattern in patterns if matches(names, [pattern]))
+        self.looks = frozenset(look_of(pattern) for pattern in patterns if pattern not in self.patterns)
+
+    def takes(self, labels: Iterable[str], looks: Iterable[str] = ()) -> bool:
+        """Whether what has these names, and this kind and colour, is meant."""
+        return matches(labels, self.patterns) or not self.looks.isdisjoint(looks)

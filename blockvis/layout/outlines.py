@@ -129,6 +129,16 @@ def _upright(points: np.ndarray) -> tuple[np.ndarray, float] | None:
     return (own, reliefs[1]) if reliefs[1] < 0.5 * reliefs[0] else (axis, reliefs[0])
 
 
+def uncovered(start: float, end: float, taken: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """List the parts of an interval, from its start to its end, that none of others covers."""
+    found, reached = [], start
+    for low, high in [*sorted(taken), (end, end)]:
+        if low > reached:
+            found.append((reached, float(min(low, end))))
+        reached = max(reached, float(high))
+    return found
+
+
 def pieces_of(shape: Any) -> list[Any]:
     """List the polygons with an area of a shape; beside lines they may lie in a collection within the collection."""
     return [piece for piece in shapely.get_parts(shapely.get_parts(shape)) if piece.area > 0.0]

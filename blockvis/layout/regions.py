@@ -187,7 +187,12 @@ def _nested(drawn: Sequence[_Drawn]) -> list[Region]:
     """Walls among the outlines of one choice: those in an even number of others; those in an odd one are openings."""
     unlike: list[_Drawn] = []
     for one in sorted(drawn, key=lambda one: -one.shape.area):
-        twin = next((k for k, other in enumerate(unlike) if _is_same(one.shape, other.shape)), None)
+        alike = (
+            one.shape.intersects(other.shape)
+            and one.shape.symmetric_difference(other.shape).area < SAME * other.shape.area
+            for other in unlike
+        )
+        twin = next((k for k, same in enumerate(alike) if same), None)
         if twin is None:
             unlike.append(one)
         elif one.holes:
@@ -198,10 +203,6 @@ def _nested(drawn: Sequence[_Drawn]) -> list[Region]:
         one, openings = unlike[k], [unlike[hole].shape for hole in inner]
         regions.append(Region(one.shape, one.labels[0], one.labels[-1], openings=[*one.holes, *openings]))
     return regions
-
-
-def _is_same(one: Any, other: Any) -> bool:
-    return bool(one.symmetric_difference(other).area < SAME * other.area) if one.intersects(other) else False
 
 
 def _no_outline(layout: Layout, drawn: Sequence[_Drawn], key: str, pattern: str) -> str:

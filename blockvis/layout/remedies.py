@@ -5,15 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
-import numpy as np
-
-import solver
-
-from .facing import faced, facing_tolerance
+from .inspect import inspected
 from .layout import Layout
 from .left_out import matches
-from .repair import DEFAULT_OVERLAP, overlaps
-from .roles import told_apart
 
 #: What is left out is less than this part of the blocks: else it is the others that are the drawing.
 LESS = 0.5
@@ -26,19 +20,6 @@ NAMED = 6
 
 #: Drawings of more blocks, or pairs that overlap, are not read again.
 MOST = 20_000
-
-
-def deep_overlaps(layout: Layout) -> list[tuple[int, int]]:
-    """Find the pairs of blocks of which a run refuses the overlap, drawn twice or not."""
-    kept = told_apart(layout, {})[1]
-    drawn = layout.chosen(kept)
-    if layout.dimension == 3:
-        assembly = solver.Assembly.from_solids(faced(drawn.solids, drawn.names).solids, names=drawn.names)
-        allowed = facing_tolerance(drawn.solids)
-    else:
-        assembly = solver.Assembly.from_outlines(drawn.outlines, names=drawn.names)
-        allowed = DEFAULT_OVERLAP * float(np.median(assembly.widths))
-    return [(int(kept[i]), int(kept[j])) for i, j, _ in overlaps(assembly, allowed)]
 
 
 def proposed_ignore(
@@ -64,7 +45,8 @@ def proposed_ignore(
     for patterns, blocks in sorted(known.items(), key=rank)[:TRIES]:
         try:
             without = read_without(patterns)
-            if without.n_blocks < (1.0 - LESS) * layout.n_blocks or deep_overlaps(without):
+            too_few = without.n_blocks < (1.0 - LESS) * layout.n_blocks
+            if too_few or (found := inspected(without)).refused or found.deep:
                 continue
         except ValueError:
             continue

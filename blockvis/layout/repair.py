@@ -97,8 +97,13 @@ def repaired(
     tolerance = DEFAULT_OVERLAP * width if overlap_tolerance is None else float(overlap_tolerance)
     found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
     refuse_overlaps(assembly, found, tolerance)
-    measured, asked = [outlines[i] for i in np.flatnonzero(free)], closing
-    thickness, closing, notes = _thickness(joint_thickness, closing, measured, laid[free])
+    notes, asked, thickness = list[str](), closing, joint_thickness
+    if isinstance(thickness, str):
+        proposal = proposed([outlines[i] for i in np.flatnonzero(free)], closing, laid[free])
+        thickness, doubt = proposal.thickness, proposal.note
+        notes = [f'joint_thickness "auto" found {thickness:g} m' + (f": {doubt}" if doubt else "")]
+        # Faces that turn out not to close edge by edge may still be closed in the other way.
+        closing = closing if proposal.method == "faces" else proposal.method
     if not found and thickness == 0:
         return outlines, notes
     depth = min(tolerance, 1.01 * found[0][2]) if found else 0.0
@@ -116,18 +121,6 @@ def repaired(
     left = [(int(i), int(j), float(d)) for i, j, d in pairs if not (anchored[i] and anchored[j])]
     notes += _notes(closed, thickness, found, left, assembly, bool(mortar), asked)
     return list(closed.outlines), notes
-
-
-def _thickness(
-    asked: float | str, closing: str, outlines: list[np.ndarray], laid: np.ndarray
-) -> tuple[float, str, list[str]]:
-    """Find the joint thickness [m] and the way of closing, and what to say of them."""
-    if isinstance(asked, str):
-        found = proposed(outlines, closing, laid)
-        notes = [f'joint_thickness "auto" found {found.thickness:g} m' + (f": {found.note}" if found.note else "")]
-        # Faces that turn out not to close edge by edge may still be closed in the other way.
-        return found.thickness, closing if found.method == "faces" else found.method, notes
-    return float(asked), closing, []
 
 
 def _notes(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -68,13 +68,16 @@ def told_apart(layout: Layout, roles: Mapping[str, str]) -> tuple[list[tuple[int
     return twins, np.setdiff1d(np.arange(layout.n_blocks), dropped)
 
 
-def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], kept: np.ndarray) -> str:
-    """Say which blocks were dropped, and in favour of which."""
+def without_twins(layout: Layout, roles: Mapping[str, str]) -> tuple[Layout, str]:
+    """Drop blocks that are drawn in the place of another, and say which, in favour of which; "" for none."""
+    twins, kept = told_apart(layout, roles)
+    if not twins:
+        return layout, ""
     stays = set(kept.tolist())
     pairs = [(first, copy) if copy in stays else (copy, first) for first, copy in twins]
-    names = [f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs]
+    names = [f"'{layout.names[gone]}' = '{layout.names[other]}'" for gone, other in pairs]
     said = "is drawn twice and was dropped" if len(twins) == 1 else "are drawn twice and were dropped"
-    return f"{len(twins)} of {layout.n_blocks} blocks {said}: {listed(names, 20)}"
+    return layout.chosen(kept), f"{len(twins)} of {layout.n_blocks} blocks {said}: {listed(names, 20)}"
 
 
 def _unmatched(key: str, layout: Layout) -> str:

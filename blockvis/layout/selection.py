@@ -1,4 +1,4 @@
-"""Which outlines of a drawing are blocks: those asked for, without debris, frames, title blocks and mortar."""
+"""Which outlines of a drawing are blocks: those asked for, in a window, without debris, frames, titles and mortar."""
 
 from __future__ import annotations
 
@@ -14,16 +14,14 @@ import shapely
 from blockvis.text import by_similarity
 from solver.mechanics import counted
 
-from .choice import KINDS, Choice, look_of
 from .crossings import uncrossed
 from .layout import Layout
-from .left_out import LeftOut, in_words, matches
+from .left_out import ENTITIES, Choice, LeftOut, in_words, look_of, matches
 from .linked import linked
 from .notes import CHANGED, LEFT_OUT, SPECK, UNIT, Note
-from .outlines import ring_area, ring_width
+from .outlines import ROUNDING, ring_area, ring_width
 from .unfilled import walls_to_fill
 from .units import doubt
-from .window import within_window
 
 #: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
 LINE = 1e-9
@@ -151,6 +149,64 @@ def _thickness_doubt(layout: Layout, median: float) -> str:
     )
 
 
+def checked_window(window: Sequence[float] | None) -> tuple[float, ...]:
+    """Return the corners x0, y0, x1, y1 of a window [m], () for none.
+
+    ValueError for anything but two corners, the lower left one first.
+    """
+    if window is None or len(window) == 0:
+        return ()
+    corners = tuple(float(x) for x in window)
+    if len(corners) != 4 or not np.isfinite(corners).all() or not (corners[0] < corners[2] and corners[1] < corners[3]):
+        raise ValueError(f"window is {list(window)}; give [x0, y0, x1, y1] in m, with x0 < x1 and y0 < y1")
+    return corners
+
+
+def within_window(layout: Layout, window: Sequence[float]) -> Layout:
+    """Keep what lies within a window; what crosses its edge is left out, and what lies beyond is counted in a note.
+
+    The window is x0, y0, x1, y1 [m], or empty. ValueError, with from where to where the drawing goes, if no block lies
+    within it.
+    """
+    if len(window) == 0:
+        return layout
+    low, high = np.array(window[:2]), np.array(window[2:])
+    near = ROUNDING * float((high - low).max())
+
+    def place(points: np.ndarray) -> str:
+        if len(points) == 0 or (points.max(axis=0) <= low + near).any() or (points.min(axis=0) >= high - near).any():
+            return "beyond"
+        return "within" if (points >= low - near).all() and (points <= high + near).all() else "edge"
+
+    of_blocks = [*map(place, layout.outlines)]
+    if "within" not in of_blocks:
+        every = np.concatenate([*layout.outlines, np.zeros((0, 2))])
+        extent, remedy = "draws no block at all", "correct the window"
+        if len(every):
+            (x0, y0), (x1, y1) = every.min(axis=0), every.max(axis=0)
+            extent = f"goes from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
+            if layout.unit_by != "user":
+                remedy = doubt(layout.unit, float(np.median(layout.sizes)), page=layout.unit_by == "page") or remedy
+        asked = ", ".join(f"{x:.6g}" for x in window)
+        raise ValueError(
+            f"'{layout.source}': no block lies within the window [{asked}] m; the drawing {extent}: {remedy}"
+        )
+    # Mortar that is drawn as one surface reaches beyond: it says nothing of the joints within.
+    beside = [(item, place(item.points)) for item in layout.left_out]
+    left_out = tuple(
+        item if where == "within" else LeftOut("edge", item.points, "", item.layer, item.name)
+        for item, where in beside
+        if where == "within" or (where == "edge" and item.closed and item.kind != "asked")
+    )
+    crossing = {i: LeftOut("edge", layout.outlines[i], "") for i, where in enumerate(of_blocks) if where == "edge"}
+    n = of_blocks.count("beyond")
+    said = f"window: {counted(n, 'outline')} beyond it {'was' if n == 1 else 'were'} left out"
+    layout = replace(layout, left_out=left_out, notes=(*layout.notes, *([Note(LEFT_OUT, said)] if n else [])))
+    cut = layout.leaving_out(crossing)
+    kept = [k for k, where in enumerate(w for w in of_blocks if w != "edge") if where == "within"]
+    return cut.chosen(kept)
+
+
 def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
     """Leave out what patterns of layers, groups, materials and names of blocks ask to leave out.
 
@@ -163,7 +219,7 @@ def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) 
     looks = set(chain(*layout.looks, *(item.looks for item in layout.left_out)))
     if only and (unmatched := _unmatched(only, every, looks)):
         raise ValueError(f"{layout.source or 'the drawing'}: only: {unmatched[0]}; correct it")
-    unmatched = _unmatched([pattern for pattern in ignore if look_of(pattern) not in KINDS], every, looks)
+    unmatched = _unmatched([pattern for pattern in ignore if look_of(pattern) not in ENTITIES], every, looks)
     unwanted, wanted = Choice(ignore, (*every, "")), Choice(only, (*every, ""))
 
     def dropped(labels: tuple[str, ...], own: tuple[str, ...]) -> bool:

@@ -101,11 +101,12 @@ def read_cut(value: Any) -> Cut:
     problem = f"is {value!r}; {_SECTION_REMEDY}"
     if isinstance(value, str):
         axis, equals, place = (word.strip() for word in value.partition("="))
-        if axis not in AXES or (equals and not place):
-            raise ValueError(problem)
-        normal = tuple(float(axis == name) for name in AXES)
-        at = _place(place, problem) if equals else None
-        point = None if at is None else tuple(at if axis == name else 0.0 for name in AXES)
+        try:
+            at = _number(float(place if equals else 0.0), problem)
+            normal = tuple(float(k == AXES.index(axis)) for k in range(3))
+        except ValueError:
+            raise ValueError(problem) from None
+        point = tuple(at * along + 0.0 for along in normal) if equals else None
         return Cut(normal, point)  # type: ignore[arg-type]
     if not isinstance(value, Mapping) or "normal" not in value or not {"point", "normal"}.issuperset(value):
         raise ValueError(problem)
@@ -115,13 +116,6 @@ def read_cut(value: Any) -> Cut:
         raise ValueError(f"has a normal of length 0; {_SECTION_REMEDY}")
     unit = (normal[0] / length, normal[1] / length, normal[2] / length)
     return Cut(unit, _triple(value["point"], problem) if "point" in value else None)
-
-
-def _place(text: str, problem: str) -> float:
-    try:
-        return _number(float(text), problem)
-    except ValueError:
-        raise ValueError(problem) from None
 
 
 def _number(value: Any, problem: str) -> float:

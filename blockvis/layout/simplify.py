@@ -44,7 +44,10 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
     if tolerance <= 0.0:
         return list(outlines), ""
     points, around = _shared_corners(outlines)
-    chains = [_chains(ids, points, nodes) for nodes in [_nodes(around, len(points))] for ids in around]
+    ends = np.concatenate([np.stack([ids, np.roll(ids, -1)], axis=1) for ids in around])
+    # Three or more edges meet at a node.
+    nodes = np.bincount(np.unique(np.sort(ends, axis=1), axis=0).ravel(), minlength=len(points)) > 2
+    chains = [_chains(ids, points, nodes) for ids in around]
     kept = set[int]()
     found = _shortened(chains, kept, points, tolerance)
     # Blocks that keep their corners may now overlap others, which then keep theirs, too.
@@ -103,14 +106,6 @@ def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np
     for ids in np.split(group, np.cumsum([len(ring) for ring in rings])[:-1]):
         around.append(ids[ids != np.roll(ids, 1)])
     return corners[first], around
-
-
-def _nodes(around: list[np.ndarray], n: int) -> np.ndarray:
-    """(n,) bool array: corners at which three or more edges meet."""
-    ends = np.concatenate([np.stack([ids, np.roll(ids, -1)], axis=1) for ids in around])
-    edges = np.unique(np.sort(ends, axis=1), axis=0)
-    count: np.ndarray = np.bincount(edges.ravel(), minlength=n)
-    return count > 2
 
 
 def _chains(ids: np.ndarray, points: np.ndarray, nodes: np.ndarray) -> list[tuple[int, ...]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike
 
 from .triangulation import triangles_of_ring
@@ -94,6 +95,14 @@ def triangles_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarr
     return np.concatenate(found)
 
 
+def plan_beyond(points: np.ndarray, height: np.ndarray, small: float = 0.0) -> shapely.Geometry:
+    """Hull in plan of what of the hull of (n, 3) points has heights (n,) [m] of at least 0, but for ``small`` [m]."""
+    up, down = height > small, height < -small
+    share = (height[up, None] / (height[up, None] - height[down]))[..., None]
+    cut = (1.0 - share) * points[up, None] + share * points[down]
+    return shapely.MultiPoint(np.vstack([points[height >= -small], cut.reshape(-1, 3)])[:, :2]).convex_hull
+
+
 def size_of(points: np.ndarray) -> float:
     """Diagonal of the box around a block."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -115,17 +124,13 @@ def between(first: ArrayLike, second: ArrayLike) -> Solid:
 def extruded(outline: ArrayLike, first: float, last: float) -> Solid:
     """Extrude an outline of the upright plane, (n, 2) array of x, z [m], along y between two places [m]."""
     ring = np.asarray(outline, dtype=float)
-
-    def at(y: float) -> np.ndarray:
-        return np.column_stack([ring[:, 0], np.full(len(ring), y), ring[:, 1]])
-
-    return between(at(first), at(last))
+    return between(*(np.insert(ring, 1, y, axis=1) for y in (first, last)))
 
 
 def prism(outline: ArrayLike, bottom: float, top: float) -> Solid:
     """Extrude an outline in plan, (n, 2) array of x, y [m], upwards between two levels [m]."""
     ring = np.asarray(outline, dtype=float)
-    return between(*(np.column_stack([ring, np.full(len(ring), z)]) for z in (bottom, top)))
+    return between(*(np.insert(ring, 2, z, axis=1) for z in (bottom, top)))
 
 
 def box(low: Sequence[float] | np.ndarray, high: Sequence[float] | np.ndarray) -> Solid:

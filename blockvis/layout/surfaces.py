@@ -21,7 +21,7 @@ def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
     [[2, 1, 0], [0, 1, 3], [2, 3, 1], [3, 2, 0]]
     """
     same = same_points(points, ROUNDING * size_of(points)).tolist()
-    rings = [_without_repeats([same[corner] for corner in face]) for face in faces]
+    rings = [[same[corner] for k, corner in enumerate(face) if same[corner] != same[face[k - 1]]] for face in faces]
     rings = [ring for ring in rings if len(ring) > 2]
     used = sorted({corner for ring in rings for corner in ring})
     if not used:
@@ -52,10 +52,6 @@ def is_closed(faces: list[list[int]]) -> bool:
 
 def _edges_of(faces: list[list[int]]) -> list[tuple[int, int]]:
     return [(ring[k - 1], ring[k]) for ring in faces for k in range(len(ring))]
-
-
-def _without_repeats(face: list[int]) -> list[int]:
-    return [corner for k, corner in enumerate(face) if corner != face[k - 1]]
 
 
 def same_points(points: np.ndarray, near: float) -> np.ndarray:

@@ -25,8 +25,8 @@ from blockvis.results.about import (
     losing,
     phases_of,
 )
+from blockvis.results.mechanism_arrays import SWING
 from blockvis.results.reaction_range import ReactionRange
-from blockvis.results.swinging import SWING
 from blockvis.results.tables import change_words
 from blockvis.results.ties import TieForceCurves, tie_force_curves
 from solver import mechanics

@@ -16,6 +16,7 @@ from blockvis.results.about import collapse_phase, loss_of
 from blockvis.results.increments import numbered
 from blockvis.results.tables import change_words
 from blockvis.system.atomic_files import atomic_file
+from blockvis.text import beginning
 from solver import mechanics
 
 from .captions import MECHANISM_BADGE, in_one_unit, loss_words, parameter_unit, phase_words
@@ -90,10 +91,8 @@ def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:
     """Read from where blocks in space are seen, and what cuts them open, both as of :func:`draw_still`."""
     found: list[Any] = []
     for name, value, read in (("view", view, read_sight), ("section", section, read_cut)):
-        try:
+        with beginning(name):
             found.append(None if value is None else read(value))
-        except ValueError as error:
-            raise ValueError(f"{name} {error}") from None
     return found[0], found[1]
 
 

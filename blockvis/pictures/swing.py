@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import falls_from
-from blockvis.results.swinging import SWING, corner_speeds, swung_increment
+from blockvis.results.mechanism_arrays import SWING, corner_speeds, swung_increment
 from solver import mechanics
 
 from . import palette

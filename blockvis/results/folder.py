@@ -8,6 +8,7 @@ import os
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -34,6 +35,7 @@ from .tables import (
     LIMIT_TABLES,
     SUPPORT_COLUMNS,
     csv_text,
+    in_place,
     own_columns,
     row_of_increment,
     rows_of_supports,
@@ -217,7 +219,8 @@ class ResultsFolder:
             # What follows the last equilibrium is known by now, and with it the states of its joints.
             write_end(self.path, response, self.vtu)
             last = at_last_equilibrium(response)
-            self._rows[-1] = row_of_increment(len(response.path) - 1, last, self.assembly, self.parameter)
+            row = row_of_increment(last, self.assembly)
+            self._rows[-1:] = in_place(len(response.path) - 1, last, self.parameter, row)
             if len(response.path) == len(self.increments):
                 # There is no frame of the fall that has the mechanism.
                 write_atomic(self._files.file(len(response.path) - 1), packed_increment(last))
@@ -251,11 +254,12 @@ class ResultsFolder:
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
-            self._rows.append(row_of_increment(number, increment, self.assembly, self.parameter))
-            self._support_rows += rows_of_supports(number, increment, self.assembly, self.parameter)
+            placed = partial(in_place, number, increment, self.parameter)
+            self._rows += placed(row_of_increment(increment, self.assembly))
+            self._support_rows += placed(*rows_of_supports(increment, self.assembly))
             self._movements.add(increment)
             if self.ties:
-                self._tie_rows += tie_rows(self.ties, number, increment, self.parameter)
+                self._tie_rows += placed(*tie_rows(self.ties, increment))
                 self._courses.add(increment)
 
     def _write_table(self, *, durable: bool = False) -> None:
@@ -293,8 +297,10 @@ class ResultsFolder:
 def locked(owner: object, folder: Path, what: str = "run") -> Callable[[], None]:
     """Lock the folder for one run or study, until the returned function is called or the process ends in any way."""
     handle = None
+    # Windows opens no folder, but a file that goes with its user.
+    file = (folder / LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0)) if WINDOWS else (folder, os.O_RDONLY)
     try:
-        handle = _opened_lock(folder)
+        handle = os.open(*file)
         _lock(handle)
     except (BlockingIOError, PermissionError):
         if handle is not None:
@@ -307,13 +313,6 @@ def locked(owner: object, folder: Path, what: str = "run") -> Callable[[], None]
         if handle is None:
             return lambda: None
     return weakref.finalize(owner, os.close, handle)
-
-
-def _opened_lock(folder: Path) -> int:
-    """Open what is locked: the folder itself, or on Windows, which opens no folder, a file that goes with its user."""
-    if WINDOWS:
-        return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0))
-    return os.open(folder, os.O_RDONLY)
 
 
 def _lock(handle: int) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
-import math
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -73,15 +72,6 @@ def _checked_arrays(data: bytes) -> dict[str, np.ndarray]:
             size = sum(entry.file_size for entry in archive.infolist())
             if size > MOST_BYTES:
                 raise ValueError(f"it unpacks to {size} bytes")
-            for name in archive.namelist():
-                with archive.open(name) as entry:
-                    version = np.lib.format.read_magic(entry)
-                    if version == (1, 0):
-                        shape, _, kind = np.lib.format.read_array_header_1_0(entry)
-                    else:
-                        shape, _, kind = np.lib.format.read_array_header_2_0(entry)
-                    if math.prod(shape) * kind.itemsize > MOST_BYTES:
-                        raise ValueError(f"it announces an array of shape {shape}")
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
     except (KeyError, TypeError, AttributeError, EOFError, SyntaxError, RuntimeError, NotImplementedError) as error:

@@ -165,25 +165,21 @@ def own_columns(parameter: mechanics.Quantity) -> tuple[str, ...]:
     return () if name in COLUMNS else (name,)
 
 
-def place_in_table(
-    number: int, increment: solver.Increment, parameter: mechanics.Quantity
-) -> tuple[tuple[Any, ...], tuple[str, ...]]:
-    """Make the first cells of a row, number, phase and settlement of an increment, and its last, of own columns."""
+def in_place(
+    number: int, increment: solver.Increment, parameter: mechanics.Quantity, *rows: Sequence[Any]
+) -> list[Sequence[Any]]:
+    """Put number, phase and settlement of an increment before rows of a table, and behind them their own columns."""
     value = repr(float(increment.parameter))
     place = number, increment.phase, value if parameter.is_path else repr(0.0)
-    return place, tuple(value for _ in own_columns(parameter))
+    return [(*place, *row, *(value for _ in own_columns(parameter))) for row in rows]
 
 
-def row_of_increment(
-    number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: mechanics.Quantity
-) -> Sequence[Any]:
-    """Make the row of response.csv for an increment over a parameter, in the order of :data:`COLUMNS`."""
+def row_of_increment(increment: solver.Increment, assembly: solver.Assembly) -> Sequence[Any]:
+    """Make the row of response.csv for an increment, in the order of :data:`COLUMNS`, but for its place."""
     certificate = increment.certificate
-    place, own = place_in_table(number, increment, parameter)
     mechanism = mechanics.mechanism_of(assembly, increment)
     counts = np.bincount(increment.states, minlength=len(mechanics.ContactState))
     return (
-        *place,
         repr(float(increment.reaction)),
         repr(float(increment.reaction) / mechanics.total_weight(assembly)),
         repr(float(increment.load_multiplier)),
@@ -195,16 +191,12 @@ def row_of_increment(
         len(mechanism.sliding),
         increment.programs,
         f"{increment.seconds:.4f}",
-        *own,
     )
 
 
-def rows_of_supports(
-    number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: mechanics.Quantity
-) -> list[Sequence[Any]]:
+def rows_of_supports(increment: solver.Increment, assembly: solver.Assembly) -> list[Sequence[Any]]:
     """Make the rows of supports.csv for an increment: what acts on each support, about its centroid where it is."""
-    place, own = place_in_table(number, increment, parameter)
     return [
-        (*place, assembly.names[k], assembly.roles[k], *map(repr, increment.support_forces[k].tolist()), *own)
+        (assembly.names[k], assembly.roles[k], *map(repr, increment.support_forces[k].tolist()))
         for k in np.flatnonzero(~assembly.free).tolist()
     ]

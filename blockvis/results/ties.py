@@ -17,7 +17,7 @@ from solver import mechanics
 
 from .about import EXACT, certified, unit_and_phase
 from .npz import packed, read_stored
-from .tables import place_in_table, removals
+from .tables import removals
 
 #: File of the ties of a results folder, which is there where it has any.
 TIES = "ties.npz"
@@ -75,13 +75,11 @@ def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: so
     return mechanics.TieForces(np.zeros(n), np.zeros(n), np.full(n, np.nan), np.zeros(n, dtype=np.int64), ends)
 
 
-def tie_rows(
-    ties: Sequence[solver.Tie], number: int, increment: solver.Increment, parameter: mechanics.Quantity
-) -> list[tuple[Any, ...]]:
-    """Make the rows of ties.csv for an increment by its number, in the order of :data:`COLUMNS`, its parameter last."""
-    found, (place, own) = increment.ties, place_in_table(number, increment, parameter)
+def tie_rows(ties: Sequence[solver.Tie], increment: solver.Increment) -> list[tuple[Any, ...]]:
+    """Make the rows of ties.csv for an increment, in the order of :data:`COLUMNS`, but for its place."""
+    found = increment.ties
     return [
-        (*place, tie.name, tie.kind, repr(float(force)), repr(float(elongation)), STATE_WORDS[state], *own)
+        (tie.name, tie.kind, repr(float(force)), repr(float(elongation)), STATE_WORDS[state])
         for tie, force, elongation, state in zip(ties, found.forces, found.elongations, found.states, strict=True)
     ]
 

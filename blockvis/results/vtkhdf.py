@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 from vtkmodules.vtkCommonCore import vtkStringArray
-from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkMultiBlockDataSet, vtkUnstructuredGrid
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkMultiBlockDataSet
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFWriter
 
@@ -66,13 +66,9 @@ class _Series(VTKPythonAlgorithmBase):
         increment, quantities, falls = as_shown(self._response, self._response.path[number])
         grids = grids_of(self._response.assembly, increment, self._response.ties, quantities, falls=falls)
         for k, (name, grid) in enumerate(grids.items()):
-            together.SetBlock(k, _without_strings(grid))
+            for attributes, array in arrays_of(grid):
+                if isinstance(array, vtkStringArray):
+                    attributes.RemoveArray(array.GetName())
+            together.SetBlock(k, grid)
             together.GetMetaData(k).Set(vtkCompositeDataSet.NAME(), name)
         return 1
-
-
-def _without_strings(grid: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
-    for attributes, array in arrays_of(grid):
-        if isinstance(array, vtkStringArray):
-            attributes.RemoveArray(array.GetName())
-    return grid

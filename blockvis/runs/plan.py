@@ -12,6 +12,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.profiles import with_profiles
 from blockvis.kinds.kind import AnalysisRun, RunInput
 from blockvis.kinds.kinds import KINDS
+from blockvis.text import beginning
 from solver import mechanics
 
 
@@ -49,10 +50,8 @@ def planned(
         )
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes, members)
     if case.settlements or kind.has_phases:
-        try:
+        with beginning(f"{case.source}:"):
             mechanics.check_settlement(assembly, case.settlements, case.controls, changes, members)
-        except ValueError as error:
-            raise ValueError(f"{case.source}: {error}") from None
     return kind.start(given, resume, found)
 
 

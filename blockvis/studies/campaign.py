@@ -9,7 +9,7 @@ import queue
 import sys
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, closing, contextmanager, suppress
 from importlib.metadata import version
@@ -289,9 +289,6 @@ def _batches(plan: Study, todo: Sequence[int], client: Client, window: int) -> I
     waiting = iter(todo)
     submitted: dict[int, Future] = {}
 
-    def queued(run: int) -> Callable[[Future], None]:
-        return lambda future: finished.put((run, future))
-
     def fill() -> None:
         while len(submitted) < window:
             run = next(waiting, None)
@@ -308,7 +305,7 @@ def _batches(plan: Study, todo: Sequence[int], client: Client, window: int) -> I
                 pure=False,
             )
             submitted[run] = future
-            future.add_done_callback(queued(run))
+            future.add_done_callback(lambda future, run=run: finished.put((run, future)))
 
     fill()
     last_worker = time.monotonic()

@@ -270,9 +270,12 @@ def _draw_shape(axes: Axes, shape: dict[str, np.ndarray], low: np.ndarray, high:
     inside = shapely.box(*(low + 0.25 * MARGIN * (high - low)), *(high - 0.25 * MARGIN * (high - low)))
     rings, colours = [], []
     for ring, colour, free in zip(np.split(shape["vertices"], cuts), fills, shape["free"], strict=True):
-        for part in [ring] if free else _parts_inside(ring, inside):
-            rings.append(part)
-            colours.append(colour / 255.0)
+        parts = [ring]
+        if not free:
+            seen = shapely.get_parts(shapely.intersection(shapely.Polygon(ring), inside))
+            parts = [shapely.get_coordinates(part.exterior) for part in seen if isinstance(part, shapely.Polygon)]
+        rings += parts
+        colours += [colour / 255.0] * len(parts)
     width = 0.7 if len(rings) < 300 else 0.25
     axes.add_collection(
         PolyCollection(
@@ -294,11 +297,6 @@ def _draw_shape(axes: Axes, shape: dict[str, np.ndarray], low: np.ndarray, high:
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.axis("off")
-
-
-def _parts_inside(ring: np.ndarray, box: shapely.Polygon) -> list[np.ndarray]:
-    found = shapely.get_parts(shapely.intersection(shapely.Polygon(ring), box))
-    return [shapely.get_coordinates(part.exterior) for part in found if isinstance(part, shapely.Polygon)]
 
 
 def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> Frame:

@@ -24,7 +24,7 @@ from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import collapse_phase, governing_limit, loss_in, phases_of
 from blockvis.results.joints import initial_joints, opening_and_slip
-from blockvis.results.swinging import SWING, swing_factors
+from blockvis.results.mechanism_arrays import SWING, swing_factors
 from blockvis.results.tables import initial_reaction
 from blockvis.runs.plan import planned
 from solver import mechanics

@@ -6,6 +6,7 @@ import copy
 import hashlib
 import tomllib
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +22,7 @@ from blockvis.cases.toml_table import Table, shortened
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kinds import KINDS
+from blockvis.text import beginning
 from solver.mechanics import Quantity, counted
 
 from . import study_keys as keys
@@ -94,10 +96,8 @@ class Study:
     def design(self) -> Design:
         """The runs: probabilities of the parameters, and seeds."""
         levels = [p.n_levels for p in self.parameters]
-        try:
+        with beginning(f"{self.source}: [study]"):
             return designed(self.method, self.runs, levels, self.repeats, self.seed, scattered=self.n_seeded > 0)
-        except ValueError as error:
-            raise ValueError(f"{self.source}: [study] {error}") from None
 
     @cached_property
     def capacity(self) -> Quantity:
@@ -200,24 +200,16 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
         values=values,
         n_seeded=len(imperfections),
         parameters=parameters,
-        method=method,
-        runs=asked["runs"],
-        repeats=asked["repeats"],
-        seed=asked["seed"],
-        seconds=asked["seconds"],
-        keep=asked["keep"],
+        **{key: value for key, value in asked.items() if key != "case"},
     )
     _check(study, where)
     return study
 
 
 def _check(study: Study, where: str) -> None:
-    try:
+    told = f"{where}with its [[imperfections]] behind those of the case,"
+    with beginning(told) if study.n_seeded else nullcontext():
         case_of(study.values, study.case_source)
-    except ValueError as error:
-        if study.n_seeded:
-            raise ValueError(f"{where}with its [[imperfections]] behind those of the case, {error}") from None
-        raise
     if study.method == "grid":
         _check_grid(study, where)
     drawn = next((p for p in study.parameters if p.points and study.method != "grid"), None)

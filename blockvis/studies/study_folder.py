@@ -8,6 +8,7 @@ import os
 import shutil
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 
 import solver
 from blockvis.results.folder import locked
+from blockvis.results.record import read_json, write_json
 from blockvis.system.atomic_files import atomic_file, flush, make_folder, write_atomic
 from solver.mechanics import counted
 
@@ -67,8 +69,11 @@ class StudyFolder:
         if self.folder.exists() and not self.folder.is_dir():
             raise StudyExists(f"'{self.folder}' is a file; choose another folder with -o")
         if record.is_file():
-            stored = _read(record) or {}
-            changed = [k for k, v in definition.items() if stored.get("definition", {}).get(k) != v]
+            # A damaged record is that of another study.
+            stored: dict[str, Any] = {}
+            with suppress(ValueError):
+                stored = read_json(record).get("definition", {})
+            changed = [k for k, v in definition.items() if stored.get(k) != v]
             if changed and not force:
                 raise StudyExists(
                     f"'{self.folder}' holds {counted(len(self._stored()), 'finished run')} of another study: "
@@ -82,21 +87,18 @@ class StudyFolder:
         self.close = locked(self, self.folder, "study")
         if force:
             self._clear()
-        write_atomic(
-            record,
-            _json(
-                {
-                    "study": str(study.source),
-                    "case": str(study.case_source),
-                    "values": study.values,
-                    "n_runs": study.n_runs,
-                    "method": study.method,
-                    "seed": study.seed,
-                    "definition": definition,
-                    "versions": {name: version(name) for name in ("blockvis", "numpy", "scipy", "highspy", "dask")},
-                }
-            ),
-        )
+        about = {
+            "study": str(study.source),
+            "case": str(study.case_source),
+            # JSON has no dates.
+            "values": json.loads(json.dumps(study.values, default=str)),
+            "n_runs": study.n_runs,
+            "method": study.method,
+            "seed": study.seed,
+            "definition": definition,
+            "versions": {name: version(name) for name in ("blockvis", "numpy", "scipy", "highspy", "dask")},
+        }
+        write_json(record, about)
         self.rows |= self._stored()
 
     def missing(self, *, retry_failed: bool = False) -> list[int]:
@@ -167,7 +169,7 @@ class StudyFolder:
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write summary.json."""
         finished = {"finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
-        write_atomic(self.folder / "summary.json", _json({**summary, **finished}))
+        write_json(self.folder / "summary.json", {**summary, **finished})
 
     def _stored(self) -> dict[int, dict[str, Any]]:
         """Read the rows on the disk, of runs that the study has."""
@@ -206,14 +208,3 @@ def _rows(file: Path) -> tuple[dict[int, dict[str, Any]], bool]:
 def _plain(value: Any) -> Any:
     """Turn a list or table into text, because a column holds numbers or texts."""
     return json.dumps(value) if isinstance(value, (list, dict)) else value
-
-
-def _json(value: Any) -> bytes:
-    return (json.dumps(value, indent=1, ensure_ascii=False, default=str) + "\n").encode()
-
-
-def _read(file: Path) -> Any:
-    try:
-        return json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None

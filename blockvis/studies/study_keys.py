@@ -12,50 +12,43 @@ import numpy as np
 from blockvis.case_files.schema import DRAFT, case_values, one_or_several
 from blockvis.cases import imperfections
 from blockvis.cases.distributions import DISTRIBUTION_KEYS, FORMS, KINDS
-from blockvis.cases.key import NUMBERS, POSITIVE, TEXT, TEXTS, Key, Section, ValueKind, one_of, whole
+from blockvis.cases.key import NUMBERS, POSITIVE, TEXT, TEXTS, Key, Section, ValueKind, one_of, read_by, whole
 from blockvis.cases.toml_table import Table, shortened
 
 from .sampling import METHODS
 
+_NAME_CASE = "name a case file, relative to the study file"
 
-def _case(table: Table, key: Key) -> Any:
-    given = table.take(key.name)
-    if given is not None and not isinstance(given, (str, Path, Mapping)):
-        raise table.error(key.name, f"is {shortened(given)}; {key.remedy}")
+
+def _case(given: Any) -> str | Path | Mapping[str, Any]:
+    if not isinstance(given, str | Path | Mapping):
+        raise ValueError(f"is {shortened(given)}; {_NAME_CASE}")
     return given
 
 
-def _runs(table: Table, key: Key) -> tuple[int, ...] | None:
-    given = table.take(key.name)
-    if given is None:
-        return None
+def _runs(given: Any) -> tuple[int, ...]:
     runs = tuple(given) if isinstance(given, list | tuple) else (given,)
     for run in runs:
         if isinstance(run, bool) or not isinstance(run, int) or run < 0:
-            raise table.error(key.name, f"names run {shortened(run)}; runs are whole numbers from 0")
+            raise ValueError(f"names run {shortened(run)}; runs are whole numbers from 0")
     return runs
 
 
-def _values(table: Table, key: Key) -> tuple[Any, ...] | None:
-    given = table.take(key.name)
-    if given is None:
-        return None
+def _values(given: Any) -> tuple[Any, ...]:
     if not isinstance(given, list | tuple) or len(given) == 0:
-        raise table.error(key.name, f"is {shortened(given)}; give a list of at least one")
+        raise ValueError(f"is {shortened(given)}; give a list of at least one")
     return tuple(given)
 
 
-def _name(table: Table, key: Key) -> str | None:
-    given: str | None = table.text(key.name)
-    if given == "":
-        raise table.error(key.name, "is empty; give a text in quotes")
+def _name(given: str) -> str:
+    if not given:
+        raise ValueError("is empty; give a text in quotes")
     return given
 
 
-def _weights(table: Table, key: Key) -> tuple[float, ...] | None:
-    given = table.numbers(key.name)
-    if given is not None and (min(given) < 0.0 or not np.any(given)):
-        raise table.error(key.name, f"is {list(given)}; give numbers of at least 0, not all 0")
+def _weights(given: tuple[float, ...]) -> tuple[float, ...]:
+    if min(given) < 0.0 or not np.any(given):
+        raise ValueError(f"is {list(given)}; give numbers of at least 0, not all 0")
     return given
 
 
@@ -63,9 +56,9 @@ STUDY = Section(
     "study",
     "The case and its runs",
     (
-        Key("case", ValueKind("name of a case file, or a table with its keys", {"type": ["string", "object"]}, _case),
-            "Base case, relative to the study file", "../semicircular_arch.toml", required=True,
-            remedy="name a case file, relative to the study file"),
+        Key("case", ValueKind("name of a case file, or a table with its keys", {"type": ["string", "object"]},
+            read_by(_case)), "Base case, relative to the study file", "../semicircular_arch.toml", required=True,
+            remedy=_NAME_CASE),
         Key("method", one_of(METHODS), 'How values are chosen; "saltelli" is for Sobol\' indices', "sobol",
             default="latin hypercube"),
         Key("runs", whole(1), "Number of runs; of saltelli the size of its two samples; a grid has as many as its "
@@ -75,15 +68,15 @@ STUDY = Section(
         Key("seconds", POSITIVE, "Longest time of one run", 600, "s", otherwise="no limit"),
         Key("keep", ValueKind("whole number, or list of them",
             {"anyOf": [{"type": "integer", "minimum": 0},
-                       {"type": "array", "items": {"type": "integer", "minimum": 0}}]}, _runs),
+                       {"type": "array", "items": {"type": "integer", "minimum": 0}}]}, read_by(_runs)),
             "Numbers of the runs, from 0, whose whole results folder is written", [3, 17], default=()),
     ),
     required=True,
 )  # fmt: skip
 
 _COMMON_KEYS = (
-    Key("name", replace(TEXT, read=_name), "Column of the table and label of the pictures", "friction",
-        otherwise="the path"),
+    Key("name", replace(TEXT, read=read_by(_name, Table.text)), "Column of the table and label of the pictures",
+        "friction", otherwise="the path"),
     Key("also", TEXTS, "Further paths that take the same value", ["supports[1].outline"], default=()),
 )  # fmt: skip
 
@@ -93,10 +86,10 @@ LISTED = Section(
     "A value of the case that takes those of a list",
     (
         *_COMMON_KEYS,
-        Key("values", ValueKind("list", {"type": "array", "minItems": 1}, _values), "Values to choose from",
+        Key("values", ValueKind("list", {"type": "array", "minItems": 1}, read_by(_values)), "Values to choose from",
             [0.3, 0.5, 0.7], otherwise="a distribution is given"),
-        Key("weights", replace(NUMBERS, read=_weights), "Their probabilities, up to a common factor", [1, 2, 1],
-            otherwise="all alike"),
+        Key("weights", replace(NUMBERS, read=read_by(_weights, Table.numbers)),
+            "Their probabilities, up to a common factor", [1, 2, 1], otherwise="all alike"),
     ),
 )  # fmt: skip
 

@@ -466,7 +466,7 @@ def test_runs_of_causes_have_the_ties_of_the_case(tmp_path):
     grounded = TIED.replace("[0.9, 0.3]", "{ fixed = [2.0, 0.0] }")
     (tmp_path / "case.toml").write_text(layout + grounded, encoding="utf-8")
     (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"case.toml: \[ties 'iron'\] is held by the ground"):
+    with pytest.raises(ValueError, match=r"case.toml: \[ties\] 'iron' is held by the ground"):
         blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")
 
 

@@ -37,7 +37,7 @@ from blockvis.pictures.swing import swing_of
 from blockvis.report.page import summary_rows
 from blockvis.results.cracks import crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
-from blockvis.results.swinging import corner_speeds, swing_factors, swung_increment
+from blockvis.results.mechanism_arrays import corner_speeds, swing_factors, swung_increment
 from blockvis.text import rounded_length, width_text
 from solver import mechanics
 

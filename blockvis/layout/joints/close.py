@@ -127,25 +127,24 @@ def close_joints(
         Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
     """
     anchored = np.zeros(len(outlines), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
-    if method == "auto":
+    # Without gaps there is nothing to share out.
+    must = method == "faces" or (method == "auto" and not thickness)
+    if method == "auto" and not must:
         # Judged as far as joints may reach: corners too blunt for this thickness count, too.
         reach = max(thickness, search_reach(outlines))
-        method = chosen_method(outlines, facing_edges(outlines, reach, laid=laid)) if thickness else "faces"
-        if method == "faces":
-            closing = _between_faces(outlines, thickness, overlap, anchored, laid)
-            whole = not len(folded(outlines, closing.outlines))
-            if whole and (not thickness or _pockets(outlines, closing.outlines, thickness) <= POCKETS):
-                return closing
-        # Without gaps there is nothing to share out.
-        method = "voronoi" if thickness else "faces"
-    if method == "voronoi":
-        # Pockets between stones of a bond are none of mortar.
-        return _to_nearest_stone(outlines, thickness, overlap, anchored if laid is None else anchored | laid, mortar)
-    closing = _between_faces(outlines, thickness, overlap, anchored, laid)
-    blocks = folded(outlines, closing.outlines)
-    if len(blocks):
-        raise FoldedOutline(int(blocks[0]))
-    return closing
+        method = chosen_method(outlines, facing_edges(outlines, reach, laid=laid))
+    if must or method == "faces":
+        closing = _between_faces(outlines, thickness, overlap, anchored, laid)
+        blocks = folded(outlines, closing.outlines)
+        if must and len(blocks):
+            raise FoldedOutline(int(blocks[0]))
+        if must or (not len(blocks) and _pockets(outlines, closing.outlines, thickness) <= POCKETS):
+            return closing
+    # Pockets between stones of a bond are none of mortar.
+    shared = share_out(outlines, thickness, anchored if laid is None else anchored | laid, mortar)
+    scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
+    n_open, largest = facing_edges(outlines, thickness, overlap).open(CLOSED * scale)
+    return Closing(tuple(shared), n_open, 0, largest, "voronoi")
 
 
 class FoldedOutline(ValueError):
@@ -164,15 +163,6 @@ def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thicknes
     pockets = sum(hole.area for hole in holes if hole.buffer(-1.5 * thickness).is_empty)
     joints = union.area - sum(shapely.Polygon(ring).area for ring in drawn)
     return float(pockets / joints) if joints > 0.0 else 0.0
-
-
-def _to_nearest_stone(
-    outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray, mortar: Sequence[LeftOut]
-) -> Closing:
-    found = facing_edges(outlines, thickness, overlap)
-    scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
-    n_open, largest = found.open(CLOSED * scale)
-    return Closing(tuple(share_out(outlines, thickness, anchored, mortar)), n_open, 0, largest, "voronoi")
 
 
 def _between_faces(

@@ -48,9 +48,9 @@ def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: floa
         if len(held) == 2 and held[0] is held[1]:
             continue
         held += [
-            _anchored_line(edges, edge)
-            for edge, anchored in zip(pair, fixed[k], strict=True)
-            if anchored and edge not in line_of
+            Line([], *normal_form(edges, {}, edge), True)
+            for edge, stays in zip(pair, fixed[k], strict=True)
+            if stays and edge not in line_of
         ]
         held.sort(key=lambda line: not line.anchored)
         line = _fitted(found, middle, [*(s for line in held for s in line.stretches), int(k)], held, closed)
@@ -59,7 +59,13 @@ def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: floa
                 line_of[int(found.edge_a[s])] = line_of[int(found.edge_b[s])] = line
         else:
             uncommon.append(int(k))
-    line_of.update(_own_lines(found, edges, anchored, middle, uncommon, line_of, closed))
+    # Edges that share no line have one fitted to their own midlines alone.
+    sides, stretches = np.concatenate([found.edge_a[uncommon], found.edge_b[uncommon]]), np.tile(uncommon, 2)
+    line_of |= {
+        edge: _fitted(found, middle, stretches[sides == edge].tolist(), [], closed)
+        for edge in np.unique(sides).tolist()
+        if edge not in line_of and not anchored[edges.block[edge]]
+    }
     lines = {
         edge: line
         for edge, line in line_of.items()
@@ -78,12 +84,6 @@ def _midlines_on_anchors(found: Facing, edges: Edges, fixed: np.ndarray) -> np.n
     return middle
 
 
-def _anchored_line(edges: Edges, edge: int) -> Line:
-    direction = edges.directions[edge]
-    normal = np.array([direction[1], -direction[0]])
-    return Line([], normal, float(normal @ edges.start[edge]), True)
-
-
 def _fitted(found: Facing, middle: np.ndarray, stretches: list[int], held: list[Line], closed: float) -> Line:
     """One line for stretches: a line that the edges have already if it fits, else the best fit to the midlines."""
     for line in held:
@@ -94,24 +94,6 @@ def _fitted(found: Facing, middle: np.ndarray, stretches: list[int], held: list[
     centre = weights @ points / weights.sum()
     normal = np.linalg.svd((points - centre) * np.sqrt(weights)[:, None], full_matrices=False)[2][-1]
     return Line(stretches, normal, float(normal @ centre))
-
-
-def _own_lines(
-    found: Facing,
-    edges: Edges,
-    anchored: np.ndarray,
-    middle: np.ndarray,
-    uncommon: list[int],
-    line_of: dict[int, Line],
-    closed: float,
-) -> dict[int, Line]:
-    """Lines of edges that share none: fitted to the midlines of the edge alone."""
-    alone: dict[int, list[int]] = {}
-    for k in uncommon:
-        for edge in (int(found.edge_a[k]), int(found.edge_b[k])):
-            if edge not in line_of and not anchored[edges.block[edge]]:
-                alone.setdefault(edge, []).append(k)
-    return {edge: _fitted(found, middle, stretches, [], closed) for edge, stretches in alone.items()}
 
 
 def moved_outlines(edges: Edges, lines: dict[int, Line], longest: float) -> list[np.ndarray]:

@@ -18,7 +18,7 @@ from blockvis.layout.left_out import LeftOut
 from blockvis.layout.linked import linked, middles
 from blockvis.layout.outlines import largest_piece, ring_of
 
-from .facing_edges import common_width
+from .facing_edges import common_width, edges_of
 
 #: Points along the outlines are this fraction of the joint thickness apart.
 SPACING = 0.2
@@ -111,7 +111,7 @@ def share_out(
         simple = _along_anchored(simple, np.array(cells), np.flatnonzero(anchored), grid)
     rings = [ring_of(cell) for cell in simple]
     fixed = np.concatenate([np.zeros((0, 2)), *(rings[i] for i in np.flatnonzero(anchored))])
-    found = [ring + origin for ring in _without_short_edges(rings, SHORTEST * size, fixed)]
+    found = [ring + origin for ring in without_short_edges(rings, SHORTEST * size, fixed)]
     return [np.asarray(outlines[i]) if anchored[i] else ring for i, ring in enumerate(found)]
 
 
@@ -135,21 +135,12 @@ def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
 def gaps_between(shapes: np.ndarray, spacing: float) -> Gaps:
     """Triangulate the gaps between shapes from points along their outlines ``spacing`` [m] apart."""
     spacing = max(spacing, float(shapely.length(shapes).sum()) / MOST_POINTS)
-    points, owner, before, after = [], [], [], []
-    for i, shape in enumerate(shapes):
-        ring = shapely.orient_polygons(shape).exterior
-        dense = shapely.get_coordinates(shapely.segmentize(ring, spacing))[:-1]
-        along = np.roll(dense, -1, axis=0) - dense
-        points.append(dense)
-        owner.append(np.full(len(dense), i))
-        after.append(along)
-        before.append(np.roll(along, 1, axis=0))
-    every, block = np.concatenate(points), np.concatenate(owner)
-    sides = [np.concatenate(part) for part in (before, after)]
-    lengths = [np.hypot(*side.T) for side in sides]
-    normals = np.stack(
-        [np.stack([s[:, 1], -s[:, 0]], axis=1) / h[:, None] for s, h in zip(sides, lengths, strict=True)]
-    )
+    borders = shapely.segmentize(shapely.get_exterior_ring(shapely.orient_polygons(shapes)), spacing)
+    edges = edges_of([shapely.get_coordinates(border)[:-1] for border in borders])
+    every, block, after = edges.start, edges.block, edges.end - edges.start
+    before = np.concatenate([np.roll(side, 1, axis=0) for side in np.split(after, edges.offsets[1:-1])])
+    lengths = [np.hypot(*side.T) for side in (before, after)]
+    normals = [side[:, ::-1] * [1.0, -1.0] / h[:, None] for side, h in zip((before, after), lengths, strict=True)]
     corners = Delaunay(every).simplices
     corners = corners[np.ptp(block[corners], axis=1) > 0]
     widths = np.zeros(len(corners))
@@ -157,7 +148,7 @@ def gaps_between(shapes: np.ndarray, spacing: float) -> Gaps:
         a, b = corners[:, one], corners[:, other]
         across = block[a] != block[b]
         # At a corner of a stone the normal is one of two, whichever faces the other point more.
-        cosine = np.min([(normals[i, a] * normals[j, b]).sum(axis=1) for i in (0, 1) for j in (0, 1)], axis=0)
+        cosine = np.min([(normals[i][a] * normals[j][b]).sum(axis=1) for i in (0, 1) for j in (0, 1)], axis=0)
         length = np.where(cosine < FACING, np.hypot(*(every[a] - every[b]).T), np.inf)
         widths = np.where(across, np.maximum(widths, length), widths)
     return Gaps(every, block, (lengths[0] + lengths[1]) / 2.0, corners, widths)
@@ -240,7 +231,7 @@ def _along_anchored(simple: np.ndarray, cells: np.ndarray, anchored: np.ndarray,
     return found
 
 
-def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndarray) -> list[np.ndarray]:
+def without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndarray) -> list[np.ndarray]:
     """Let edges shorter than a length [m] shrink to a point, in all outlines that share them; ``fixed`` corners stay.
 
     Outlines that are neighbours share their corners to the last digit.

@@ -11,7 +11,7 @@ from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial import cKDTree
 
 from blockvis.layout.linked import middles
-from blockvis.layout.outlines import largest_piece, ring_of, without_collinear
+from blockvis.layout.outlines import largest_piece, rectangle, ring_of, without_collinear
 from solver import mechanics
 
 from .facing_edges import CLOSED, Edges, Facing
@@ -136,11 +136,8 @@ def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, dista
     spare = max(0.5 * size, thickness)
     first = -2.0 * LONGEST_MITRE * thickness if first <= spare else first
     last = size + 2.0 * LONGEST_MITRE * thickness if size - last <= spare else last
-    corners = [start + x * along + y * outward for x, y in ((first, 0.0), (last, 0.0), (last, 0.0), (first, 0.0))]
-    reach = (2.0 * thickness + distance) * outward
-    return shapely.Polygon(
-        [corners[0] - thickness * outward, corners[1] - thickness * outward, corners[2] + reach, corners[3] + reach]
-    )
+    strip = rectangle(first, -thickness, last, 2.0 * thickness + distance)
+    return shapely.Polygon(start + strip @ np.array([along, outward]))
 
 
 def merge_close_corners(
