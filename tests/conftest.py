@@ -1,9 +1,11 @@
 """What tests share: solved structures, their results folders, a Dask cluster."""
 
 import os
+import pkgutil
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 # pytest-xdist has a worker for each core: threads of the linear algebra, which is loaded below, would wait for cores
 # that other workers have.
@@ -15,6 +17,9 @@ from hypothesis import settings
 
 import blockvis
 import solver
+
+#: What writes titles, details and legends around pictures.
+SHEET = "blockvis.pictures.frame.Sheet.composed"
 
 # The same examples at every run: HYPOTHESIS_PROFILE=default looks for others.
 settings.register_profile("same", derandomize=True, deadline=None)
@@ -34,14 +39,29 @@ def arch() -> solver.Response:
 
 
 @pytest.fixture(scope="session")
-def _arch_written(arch: solver.Response, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def arch_folder(arch: solver.Response, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results folder of the reference arch, for tests that only read it."""
     return blockvis.write(arch, tmp_path_factory.mktemp("arch") / "out")
 
 
 @pytest.fixture
-def arch_results(_arch_written: Path, tmp_path: Path) -> Path:
+def arch_results(arch_folder: Path, tmp_path: Path) -> Path:
     """The results folder of the reference arch: a copy that the test may spoil."""
-    return shutil.copytree(_arch_written, tmp_path / "out")
+    return shutil.copytree(arch_folder, tmp_path / "out")
+
+
+@pytest.fixture
+def words(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """What the sheets of pictures say from here on, one dictionary per picture."""
+    told: list[dict[str, Any]] = []
+    composed = pkgutil.resolve_name(SHEET)
+
+    def noted(self: Any, picture: Any, **said: Any) -> Any:
+        told.append(said)
+        return composed(self, picture, **said)
+
+    monkeypatch.setattr(SHEET, noted)
+    return told
 
 
 @pytest.fixture(scope="module")

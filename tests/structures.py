@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import astuple, replace
+from dataclasses import astuple, fields, is_dataclass, replace
 from functools import cache
 from itertools import pairwise, product
 from pathlib import Path
@@ -206,31 +206,43 @@ def case_from(text: str, folder: Path | None = None) -> blockvis.Case:
         return blockvis.read_case(path)
 
 
-class _Built(Exception):
+class _Begun(Exception):
     """A run has its assembly, and is stopped."""
 
 
-class _Builder:
-    """An output of runs that wants no more than the assembly."""
+class _Beginning:
+    """An output of runs that wants no more than what they begin with, read from the results folder."""
+
+    def __init__(self, read):
+        self.read = read
 
     def begin(self, case):
         pass
 
     def follow(self, results):
-        raise _Built(results.assembly)
+        raise _Begun(self.read(results))
 
     def close(self):
         pass
 
 
-def assembly_of(case: blockvis.Case | str | Path) -> solver.Assembly:
-    """The assembly with which the run of a case begins."""
+def _at_the_beginning(case: blockvis.Case | str | Path, read):
     with tempfile.TemporaryDirectory() as folder:
         try:
-            blockvis.run_case(case, Path(folder) / "out", outputs=[_Builder()])
-        except _Built as built:
-            return built.args[0]
+            blockvis.run_case(case, Path(folder) / "out", outputs=[_Beginning(read)])
+        except _Begun as begun:
+            return begun.args[0]
     raise AssertionError("the run ended before it began")
+
+
+def assembly_of(case: blockvis.Case | str | Path) -> solver.Assembly:
+    """The assembly with which the run of a case begins."""
+    return _at_the_beginning(case, lambda results: results.assembly)
+
+
+def begun(case: blockvis.Case | str | Path) -> solver.Response:
+    """The response of a run of a case before its first increment: its assembly, laws, loads and ties."""
+    return _at_the_beginning(case, lambda results: blockvis.open_results(results.path))
 
 
 def layout_of(assembly: solver.Assembly):
@@ -344,6 +356,19 @@ def wall(columns: int, courses: int) -> solver.Assembly:
         names=[*names, "footing left", "footing right"],
         materials=["brick"] * bricks + ["concrete"] * 2,
     )
+
+
+def same(one, other) -> bool:
+    """Whether two values have the same types, fields and arrays, bit for bit."""
+    if is_dataclass(one):
+        return type(one) is type(other) and all(same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    if isinstance(one, float) and np.isnan(one):
+        return isinstance(other, float) and np.isnan(other)
+    return type(one) is type(other) and one == other
 
 
 def equal_certificates(one: solver.Certificate, other: solver.Certificate) -> bool:

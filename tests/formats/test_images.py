@@ -293,14 +293,14 @@ def test_what_is_transparent_around_lines_is_paper(tmp_path, ink):
 
 @pytest.mark.parametrize("form", ["png", "jpg", "webp", "bmp"])
 def test_thick_outlines_of_stones_in_mortar_are_lines_too(tmp_path, form):
-    image = Image.new("L", (900, 600), 255)
+    image = Image.new("L", (640, 410), 255)
     draw = ImageDraw.Draw(image)
-    draw.rectangle((40, 40, 860, 560), outline=0, width=7)
-    boxes = [(70 + 130 * i, 70 + 95 * j, 170 + 130 * i, 140 + 95 * j) for i in range(6) for j in range(5)]
+    draw.rectangle((40, 40, 600, 370), outline=0, width=7)
+    boxes = [(70 + 130 * i, 70 + 95 * j, 170 + 130 * i, 140 + 95 * j) for i in range(4) for j in range(3)]
     for box in boxes:
         draw.ellipse(box, outline=0, width=7)
     image.save(tmp_path / f"thick.{form}")
-    layout = read_layout(tmp_path / f"thick.{form}", width=9.0)
+    layout = read_layout(tmp_path / f"thick.{form}", width=6.4)
     assert (layout.n_blocks, len(layout.left_out)) == (len(boxes), 2)
     assert any(note.startswith("a drawing of lines") for note in layout.notes)
 

@@ -19,13 +19,13 @@ CASE = Path(__file__).parents[2] / "examples" / "semicircular_arch.toml"
 SCATTER = 'kind = "density", distribution = "lognormal", deviation = 0.01'
 
 
-@pytest.fixture
-def other(tmp_path):
+@pytest.fixture(scope="module")
+def other(tmp_path_factory):
     """Results of the same arch whose springer sinks as well."""
     arch = generators.arch()
     settlement = solver.Settlement((1, -0.5), increment=0.02, limit=0.06)
     response = solver.Structure(arch, friction_coefficient=2.0).settle(settlement)
-    return blockvis.write(response, tmp_path / "sinking-results")
+    return blockvis.write(response, tmp_path_factory.mktemp("other") / "sinking-results")
 
 
 def table(page, name):
@@ -36,9 +36,9 @@ def table(page, name):
 
 
 @pytest.mark.slow
-def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_path, capsys):
+def test_numbers_curves_and_cracks_stand_side_by_side(arch_folder, other, tmp_path, capsys):
     out = tmp_path / "both"
-    assert main(["compare", str(arch_results), str(other), "-o", str(out), "--animation", "none"]) == 0
+    assert main(["compare", str(arch_folder), str(other), "-o", str(out), "--animation", "none"]) == 0
     assert f"compared in {out}/: compare.html, curves.png, side_by_side.png" in capsys.readouterr().out
     page = (out / "compare.html").read_text(encoding="utf-8")
     assert "No case in out and sinking, written from Python" in page
@@ -104,30 +104,30 @@ def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp
 
 @pytest.mark.parametrize(("opening", "told"), [(1.1846e-3, "1.18 mm"), (3e-13, "0 mm")])
 @pytest.mark.slow
-def test_widths_of_cracks_are_rounded_once(arch_results, other, tmp_path, monkeypatch, opening, told):
+def test_widths_of_cracks_are_rounded_once(arch_folder, other, tmp_path, monkeypatch, opening, told):
     """As the report of each run has them; what rounding leaves of a closed joint is no width."""
     openings = "blockvis.comparison.compared.opening_and_slip"
     monkeypatch.setattr(openings, lambda assembly, joints, pose: np.tile([opening, 0.0], (len(joints), 1)))
     picture, blank = "blockvis.pictures.drawer.Drawer.picture", Image.new("RGB", (800, 620))
     monkeypatch.setattr(picture, lambda *of, **look: blank)
-    assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    assert main(["compare", str(arch_folder), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
     cracks = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "cracks")
     assert cracks.pop("") == ["out", "sinking"]
     assert {cell for cells in cracks.values() for cell in cells} == {told}
 
 
-def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_path, monkeypatch):
+def test_both_pictures_of_a_settlement_have_one_unit(arch_folder, other, tmp_path, monkeypatch):
     """That of the run that goes further."""
     titles, blank = [], Image.new("RGB", (800, 620))
     picture = "blockvis.pictures.drawer.Drawer.picture"
     monkeypatch.setattr(picture, lambda *of, title="", **look: titles.append(title.split("   ")[0]) or blank)
-    assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    assert main(["compare", str(arch_folder), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
     assert titles == [f"Settlement {at} m" for at in ("0.0200", "0.0400", "0.0600") for _ in range(2)]
 
 
 @pytest.mark.parametrize("name", ["both.gif", "both.webp"])
 @pytest.mark.slow
-def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(name, arch_results, other, tmp_path, monkeypatch):
+def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(name, arch_folder, other, tmp_path, monkeypatch):
     """Openings are to be compared by eye, and no browser plays a .gif as a video."""
     scales, blank = [], Image.new("RGB", (800, 620))
     picture = "blockvis.pictures.drawer.Drawer.picture"
@@ -231,9 +231,9 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_film_goes_in_step(arch_results, other, tmp_path):
+def test_the_film_goes_in_step(arch_folder, other, tmp_path):
     out = tmp_path / "both"
-    assert main(["compare", str(arch_results), str(other), "-o", str(out)]) == 0
+    assert main(["compare", str(arch_folder), str(other), "-o", str(out)]) == 0
     frames = [frame.astype(int) for frame in film_frames(out / "compare.mp4")]
     # The sinking arch stops at less than half of the way of the other, which moves to its end.
     half = frames[0].shape[1] // 2
@@ -243,7 +243,7 @@ def test_the_film_goes_in_step(arch_results, other, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, capsys):
+def test_what_cannot_be_compared_is_refused_in_one_line(arch_folder, tmp_path, capsys):
     limit = solver.Structure(generators.arch(), friction_coefficient=2.0).limit_load(acceleration=(1, 0))
     standing = blockvis.write(limit.response, tmp_path / "limit")
     empty = tmp_path / "empty"
@@ -251,7 +251,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, 
     turn = solver.Settlement(rotation=1.0, rotation_centre=(1, 0), increment=1e-3, limit=1e-3)
     turned = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0).settle(turn)
     for other, words in (
-        (arch_results, "are the same folder; give the results of two runs"),
+        (arch_folder, "are the same folder; give the results of two runs"),
         (standing, "share no axis"),
         (blockvis.write(turned, tmp_path / "turned"), "the parameter is settlement [m] in one and settlement [rad] in"),
         (
@@ -260,12 +260,12 @@ def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, 
         ),
         (empty, "holds no results"),
     ):
-        assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both")]) == 2
+        assert main(["compare", str(arch_folder), str(other), "-o", str(tmp_path / "both")]) == 2
         message = capsys.readouterr().err
         assert words in message
         assert message.count("\n") == 1
     assert not (tmp_path / "both").exists()
-    assert main(["compare", str(arch_results), str(standing), "-o", str(arch_results), "--force"]) == 2
+    assert main(["compare", str(arch_folder), str(standing), "-o", str(arch_folder), "--force"]) == 2
     assert capsys.readouterr().err.endswith("holds results already (increments); choose another folder with -o\n")
 
 

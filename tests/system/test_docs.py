@@ -26,8 +26,8 @@ def missing(names):
     return sorted(set(names) - NAMED)
 
 
-def test_columns_of_tables_are_named(arch_results):
-    for table in arch_results.glob("*.csv"):
+def test_columns_of_tables_are_named(arch_folder):
+    for table in arch_folder.glob("*.csv"):
         header = next(csv.reader(table.read_text(encoding="utf-8").splitlines()))
         columns = [re.sub(r" \[.*\]$", "", column) for column in header]
         assert missing(column for column in columns if " at largest " not in column) == [], table.name
@@ -40,8 +40,8 @@ def keys_of(summary):
         yield from limit
 
 
-def test_keys_of_the_summary_are_named(arch_results):
-    assert missing(keys_of(json.loads((arch_results / "summary.json").read_text(encoding="utf-8")))) == []
+def test_keys_of_the_summary_are_named(arch_folder):
+    assert missing(keys_of(json.loads((arch_folder / "summary.json").read_text(encoding="utf-8")))) == []
 
 
 @pytest.mark.parametrize(
@@ -86,14 +86,14 @@ parameters = { blocks = 2 }
         assert missing(column for column in columns if " at largest " not in column) == [], table.name
 
 
-def test_arrays_of_vtu_files_are_named(arch_results):
+def test_arrays_of_vtu_files_are_named(arch_folder):
     for what in ("blocks", "contacts", "joints"):
-        grid = pv.read(next((arch_results / "increments").glob(f"{what}_*.vtu")))
+        grid = pv.read(next((arch_folder / "increments").glob(f"{what}_*.vtu")))
         assert missing([*grid.point_data, *grid.cell_data, *grid.field_data]) == [], what
 
 
-def test_files_of_the_results_folder_are_named(arch_results):
-    files = {path.name for path in arch_results.iterdir() if path.is_file()}
+def test_files_of_the_results_folder_are_named(arch_folder):
+    files = {path.name for path in arch_folder.iterdir() if path.is_file()}
     assert missing(files) == []
 
 

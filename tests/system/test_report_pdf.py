@@ -51,8 +51,8 @@ def test_a_report_of_nothing_is_refused(tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_view_is_of_the_report_on_paper(arch_results, capsys):
-    assert main(["report", str(arch_results), "--view", "below"]) == 2
+def test_a_view_is_of_the_report_on_paper(arch_folder, capsys):
+    assert main(["report", str(arch_folder), "--view", "below"]) == 2
     assert "--view and --section are of the report on paper, report.html turns; add --pdf" in capsys.readouterr().err
 
 

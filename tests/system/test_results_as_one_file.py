@@ -15,11 +15,6 @@ from blockvis.cli import main
 from solver import mechanics
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return blockvis.write(arch_response(), tmp_path_factory.mktemp("results") / "out")
-
-
 def converted(folder, target, *options):
     assert main(["convert", str(folder), str(target), *options]) == 0
     return target
@@ -50,13 +45,13 @@ def shows_each_increment(response, file):
     np.testing.assert_allclose(first["blocks"].points, response.mesh(0).points, atol=1e-12)
 
 
-def test_a_series_shows_each_increment_at_its_settlement(folder, tmp_path):
-    shows_each_increment(arch_response(), converted(folder, tmp_path / "arch.vtkhdf"))
+def test_a_series_shows_each_increment_at_its_settlement(arch_folder, tmp_path):
+    shows_each_increment(arch_response(), converted(arch_folder, tmp_path / "arch.vtkhdf"))
 
 
-def test_a_series_is_named_where_no_other_file_is_written_or_read(folder, tmp_path, capsys):
-    assert main(["convert", str(folder), str(tmp_path / "a.nothing")]) == 2
-    assert main(["convert", str(converted(folder, tmp_path / "a.vtkhdf")), str(tmp_path / "a.dxf")]) == 2
+def test_a_series_is_named_where_no_other_file_is_written_or_read(arch_folder, tmp_path, capsys):
+    assert main(["convert", str(arch_folder), str(tmp_path / "a.nothing")]) == 2
+    assert main(["convert", str(converted(arch_folder, tmp_path / "a.vtkhdf")), str(tmp_path / "a.dxf")]) == 2
     with pytest.raises(SystemExit):
         main(["convert", "--help"])
     said, written = capsys.readouterr()[::-1]
@@ -95,8 +90,8 @@ def test_an_animation_moves_blocks_as_they_did(tmp_path):
 
 
 @pytest.mark.thorough
-def test_an_animation_lets_blocks_fall(folder, tmp_path):
-    file = converted(folder, tmp_path / "arch.glb")
+def test_an_animation_lets_blocks_fall(arch_folder, tmp_path):
+    file = converted(arch_folder, tmp_path / "arch.glb")
     drawn = arch_response().assembly.vertices
     length, start = played(file, 0.0)
     np.testing.assert_allclose(start[:, :2], [drawn.min(axis=0), drawn.max(axis=0)], atol=1e-3)
@@ -128,8 +123,8 @@ def test_what_never_stood_swings_out(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [pytest.param(".dxf", marks=pytest.mark.thorough), ".obj"])
-def test_the_deformed_layout_is_that_of_the_last_equilibrium(suffix, folder, tmp_path, capsys):
-    file = converted(folder, tmp_path / f"deformed{suffix}")
+def test_the_deformed_layout_is_that_of_the_last_equilibrium(suffix, arch_folder, tmp_path, capsys):
+    file = converted(arch_folder, tmp_path / f"deformed{suffix}")
     assert f"as they are at settlement {arch_response().path[-1].settlement:.6g} m" in capsys.readouterr().out
     layout = blockvis.read_layout(file)
     corners = np.concatenate(layout.outlines)
@@ -205,10 +200,10 @@ def test_lost_blocks_are_left_out_of_the_deformed_layout(tmp_path, capsys):
     assert "brick" not in layout.names
 
 
-def test_options_of_layout_files_are_refused_for_results(folder, tmp_path, capsys):
-    assert main(["convert", str(folder), str(tmp_path / "a.dxf"), "--unit", "mm"]) == 2
+def test_options_of_layout_files_are_refused_for_results(arch_folder, tmp_path, capsys):
+    assert main(["convert", str(arch_folder), str(tmp_path / "a.dxf"), "--unit", "mm"]) == 2
     assert "--unit is of layout files" in capsys.readouterr().err
-    assert main(["convert", str(folder), str(tmp_path / "a.compas.json")]) == 2
+    assert main(["convert", str(arch_folder), str(tmp_path / "a.compas.json")]) == 2
     assert "--dimension 3" in capsys.readouterr().err
-    assert main(["convert", str(folder), str(tmp_path / "a.compas.json"), "--dimension", "3"]) == 0
-    assert blockvis.read_layout(tmp_path / "a.compas.json").n_blocks == blockvis.open_results(folder).assembly.n_blocks
+    assert main(["convert", str(arch_folder), str(tmp_path / "a.compas.json"), "--dimension", "3"]) == 0
+    assert blockvis.read_layout(tmp_path / "a.compas.json").n_blocks == arch_response().assembly.n_blocks

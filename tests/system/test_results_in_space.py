@@ -5,14 +5,14 @@ import json
 import re
 import shutil
 import warnings
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import pyvista as pv
 from PIL import Image
-from structures import alike, arch_response, box, pixels, upright, vault_response
+from structures import alike, arch_response, box, pixels, same, upright, vault_response
 from test_paraview import PVPYTHON, READ, told_by
 from test_report import browser, visited
 
@@ -51,15 +51,6 @@ animation = "collapse.mp4"
 
 #: An L of unit thickness: its faces at both ends have a re-entrant corner.
 ELL = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]], dtype=float)
-
-
-def same(one, other):
-    """Whether two values have the same fields and arrays, bit for bit."""
-    if is_dataclass(one):
-        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
-    if isinstance(one, np.ndarray):
-        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
-    return one == other
 
 
 @pytest.mark.slow

@@ -21,6 +21,11 @@ def covered(picture, colour, tolerance=6):
     return int((np.abs(picture[50:310] - colour) <= tolerance).all(axis=2).sum())
 
 
+def details(words):
+    """The second lines of the drawings."""
+    return [said["detail"] for said in words]
+
+
 def test_each_main_crack_has_its_colour_and_its_width(tmp_path, monkeypatch):
     response, written = arch_response(), []
     monkeypatch.setattr(crack_drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
@@ -85,16 +90,11 @@ def test_cracks_in_space_are_darker_where_they_are_wider(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, monkeypatch):
+def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, words):
     """Three boxes in a row, of two joints the one that is open by 20 mm is cut away, or one lies in the section."""
     assembly = solver.Assembly.from_solids([box((x, 0, 0), (x + 1, 1, 1)) for x in (0, 1, 2)])
     pose = solver.Pose.initial(assembly)
     pose.positions[:, 0] += -0.005, 0.0, 0.02
-    details = []
-    sheet, composed = crack_drawing.Sheet, crack_drawing.Sheet.composed
-    monkeypatch.setattr(
-        sheet, "composed", lambda *args, **given: (details.append(given["detail"]), composed(*args, **given))[1]
-    )
     for section, view in (
         ("x = 1.5", "left"),
         ("x = 1.5", "right"),
@@ -103,14 +103,14 @@ def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, monkeypatch):
         ("x = 1", "left"),
     ):
         draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE, section=section, view=view)
-    assert ["   ·   ".join(detail.split("   ·   ")[:2]) for detail in details] == [
+    assert ["   ·   ".join(detail.split("   ·   ")[:2]) for detail in details(words)] == [
         "2 cracks, of which the section shows 1   ·   the widest 20 mm",
         "2 cracks, of which the section shows 1   ·   the widest 5 mm",
         "2 cracks   ·   the widest 20 mm",
         "2 cracks, of which the section shows none   ·   drawn on the layout",
         "2 cracks, of which the section shows 1   ·   the widest 20 mm",
     ]
-    assert [detail.split("   ·   ")[-1] for detail in details] == [
+    assert [detail.split("   ·   ")[-1] for detail in details(words)] == [
         f"section {plane} m" for plane in ("x = 1.5", "x = 1.5", "y = 0.5", "x = 0.5", "x = 1")
     ]
 
@@ -158,29 +158,18 @@ def test_cracks_are_labelled_where_they_are_drawn(monkeypatch, places, along, to
     assert written == [f"{told} mm"]
 
 
-def details(monkeypatch):
-    """The second lines of the drawings that are made from here on."""
-    said = []
-    sheet, composed = crack_drawing.Sheet, crack_drawing.Sheet.composed
-    monkeypatch.setattr(
-        sheet, "composed", lambda *args, **given: (said.append(given["detail"]), composed(*args, **given))[1]
-    )
-    return said
-
-
 @pytest.mark.slow
-def test_a_crack_behind_a_wall_is_looked_at_from_behind(tmp_path, monkeypatch):
+def test_a_crack_behind_a_wall_is_looked_at_from_behind(tmp_path, words):
     """Two boxes that part by 20 mm behind a screen; what is asked for holds, and says that it shows none of it."""
     boxes = [box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (2, 1, 1)), box((-4, -2, -1), (6, -1, 4))]
     assembly = solver.Assembly.from_solids(boxes, roles=["free", "free", "fixed"])
     pose = solver.Pose.initial(assembly)
     pose.positions[1, 0] += 0.02
-    said = details(monkeypatch)
     for view in (None, "above", {"azimuth": -60, "elevation": 24}, "back"):
         picture = pixels(draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE, view=view))
         hidden = view is not None and "azimuth" in view
         assert bool(covered(picture, palette.crack_colours(4)[-1], 30)) is not hidden
-    assert said == [
+    assert details(words) == [
         *2 * ["1 crack   ·   the widest 20 mm   ·   drawn on the layout"],
         "1 crack, in no view   ·   the widest 20 mm   ·   drawn on the layout",
         "1 crack   ·   the widest 20 mm   ·   drawn on the layout",
@@ -188,18 +177,17 @@ def test_a_crack_behind_a_wall_is_looked_at_from_behind(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_step_between_blocks_in_space_is_drawn_though_no_joint_is_open(tmp_path, monkeypatch):
+def test_a_step_between_blocks_in_space_is_drawn_though_no_joint_is_open(tmp_path, words):
     assembly = solver.Assembly.from_solids([box((-1, 0, 0), (0, 1, 1)), box((0, 0, 0), (1, 1, 1))])
     pose = solver.Pose.initial(assembly)
     pose.positions[1, 2] -= 0.25
-    said = details(monkeypatch)
     picture = pixels(draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE))
-    assert said == ["no joint is open   ·   joints slide by up to 250 mm   ·   drawn on the layout"]
+    assert details(words) == ["no joint is open   ·   joints slide by up to 250 mm   ·   drawn on the layout"]
     assert covered(picture, palette.SLIDING, 30) > 100
     # Beside a crack that is ten times as wide as they slide they are no step.
     pose.positions[1] += 3.0, 0.0, 0.0
     draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)
-    assert said[1:] == ["1 crack   ·   the widest 3000 mm   ·   drawn on the layout"]
+    assert details(words)[1:] == ["1 crack   ·   the widest 3000 mm   ·   drawn on the layout"]
 
 
 @pytest.mark.slow
@@ -215,21 +203,20 @@ def test_the_legend_of_cracks_in_space_names_a_moving_support_that_is_seen(tmp_p
         assert (picture[320:] == named).all(axis=2).any() == (view == "front")
 
 
-def test_a_step_in_the_plane_is_said(tmp_path, monkeypatch):
+def test_a_step_in_the_plane_is_said(tmp_path, words):
     """A joint that slides and belongs to no crack; through those that do a stepped crack runs."""
     rings = [rectangle(x, 0.0, x + 1.0, 1.0) for x in (0.0, 1.0, 2.0)]
     assembly = solver.Assembly.from_outlines(rings)
     pose = solver.Pose.initial(assembly)
     pose.positions[1:, 1] -= 0.25
     pose.positions[2, 0] += 0.03
-    said = details(monkeypatch)
     draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)
     counts = "1 crack   ·   lines as thick as they are open, the thickest 30 mm"
-    assert said == [f"{counts}   ·   joints slide by up to 250 mm, not drawn   ·   drawn on the layout"]
+    assert details(words) == [f"{counts}   ·   joints slide by up to 250 mm, not drawn   ·   drawn on the layout"]
 
 
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.slow)])
-def test_a_step_is_said_though_it_is_part_of_a_crack(tmp_path, monkeypatch, dimension):
+def test_a_step_is_said_though_it_is_part_of_a_crack(tmp_path, words, dimension):
     """Two blocks past each other by 250 mm and open by 5 are a crack of 5 mm, in the plane as in space."""
     if dimension == 2:
         assembly = solver.Assembly.from_outlines([rectangle(-1, 0, 0, 1), rectangle(0, 0, 1, 1)])
@@ -237,6 +224,5 @@ def test_a_step_is_said_though_it_is_part_of_a_crack(tmp_path, monkeypatch, dime
         assembly = solver.Assembly.from_solids([box((-1, 0, 0), (0, 1, 1)), box((0, 0, 0), (1, 1, 1))])
     pose = solver.Pose.initial(assembly)
     pose.positions[1, [0, -1]] += 0.005, -0.25
-    said = details(monkeypatch)
     draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)
-    assert said[0].endswith(" 5 mm   ·   joints slide by up to 250 mm   ·   drawn on the layout")
+    assert details(words)[0].endswith(" 5 mm   ·   joints slide by up to 250 mm   ·   drawn on the layout")

@@ -42,7 +42,9 @@ def test_blocks_carry_what_happened_to_them():
 def test_contact_forces_balance_the_weight():
     response = arch_response()
     assembly = response.assembly
-    grid = response.contacts(len(response.path) - 1)
+    grid, last = response.contacts(len(response.path) - 1), response.path[-1]
+    assert grid.n_cells == len(last.contacts)
+    np.testing.assert_allclose(grid.point_data["normal_force"], last.forces[:, 0])
     total = np.zeros((assembly.n_blocks, 3))
     np.add.at(total, grid.point_data["block_a"], grid.point_data["force"])
     np.subtract.at(total, grid.point_data["block_b"], grid.point_data["force"])

@@ -11,7 +11,7 @@ import pytest
 import pyvista as pv
 import shapely
 from scipy.integrate import solve_ivp
-from structures import box, parted, pixels, rectangle, report_of, wall
+from structures import arch_response, box, parted, pixels, rectangle, report_of, wall
 
 import blockvis
 import solver
@@ -363,7 +363,7 @@ def test_poses_between_those_kept():
 
 
 def test_what_does_not_collapse_along_a_path_does_not_fall():
-    response = shipped_arch()
+    response = arch_response()
     assert fall_of(replace(response, stop=solver.Status.LIMIT_REACHED, collapse=None)) is None
     limits = solver.LimitLoad
     assert fall_of(replace(response, limits=(limits,))) is None

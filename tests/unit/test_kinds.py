@@ -127,6 +127,9 @@ tilt_step = 0.03
 """
 
 
+SETTLING = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
+
+
 def test_a_new_kind_is_an_object_of_its_own(tmp_path, monkeypatch):
     """A block of b × h on ground that tilts turns over at tan θ = b/h."""
     monkeypatch.setitem(KINDS, "tilt", TiltKind())
@@ -218,7 +221,6 @@ def test_the_bar_of_several_settlements_has_the_unit_of_each(tmp_path, monkeypat
 def test_a_single_step_that_takes_long_is_told_too(tmp_path, monkeypatch):
     monkeypatch.setattr("blockvis.runs.progress.BEAT", 0.01)
     monkeypatch.setattr("blockvis.runs.progress.LINES", 0.0)
-    text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
     told = threading.Event()
 
     class Stream(io.StringIO):
@@ -228,27 +230,31 @@ def test_a_single_step_that_takes_long_is_told_too(tmp_path, monkeypatch):
             return super().write(words)
 
     monkeypatch.setattr("sys.stderr", Stream())
-    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), None, count=3)
+    bar = Progress(KINDS["settlement"].course(case_from(SETTLING, tmp_path)), None, count=3)
     bar.watch()
     assert told.wait(timeout=60)
     bar.done()
 
 
-def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monkeypatch):
-    monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
-    text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
-    stream, seen = Terminal(), []
-    outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
-    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
-    monkeypatch.setattr("sys.stderr", stream)
-    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), assembly)
-    steps = mechanics.settlement_increments(
+def sinking(assembly, on_step):
+    """The increments of a support that sinks by 0.1 m, with who hears each step."""
+    return mechanics.settlement_increments(
         assembly,
         [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
         interfaces=solver.Interfaces(solver.InterfaceLaw(0.6)),
         loads=solver.self_weight(assembly),
-        on_step=lambda state: (seen.append(state.place.s), bar.step(state)),
+        on_step=on_step,
     )
+
+
+def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
+    stream, seen = Terminal(), []
+    outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
+    monkeypatch.setattr("sys.stderr", stream)
+    bar = Progress(KINDS["settlement"].course(case_from(SETTLING, tmp_path)), assembly)
+    steps = sinking(assembly, lambda state: (seen.append(state.place.s), bar.step(state)))
     assert len(list(steps)) == 2
     assert seen == sorted(seen)
     assert len(seen) > 2
@@ -262,17 +268,10 @@ def test_a_listener_hears_each_step_in_which_blocks_come_to_rest(tmp_path, monke
     """A stone that is drawn above its support drops on it before the first increment."""
     monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
     monkeypatch.setattr("sys.stderr", stream := Terminal())
-    text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
     outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 1e-3], [0.2, 1e-3], [0.2, 1], [-0.2, 1]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
-    bar, heard = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), assembly), []
-    steps = mechanics.settlement_increments(
-        assembly,
-        [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
-        interfaces=solver.Interfaces(solver.InterfaceLaw(0.6)),
-        loads=solver.self_weight(assembly),
-        on_step=lambda state: (heard.append((state.phase, state.place.s)), bar.step(state)),
-    )
+    bar, heard = Progress(KINDS["settlement"].course(case_from(SETTLING, tmp_path)), assembly), []
+    steps = sinking(assembly, lambda state: (heard.append((state.phase, state.place.s)), bar.step(state)))
     first = next(iter(steps))
     assert first.pose.positions[1, 1] < assembly.centroids[1, 1] - 9e-4
     assert len(heard) > 2

@@ -212,8 +212,6 @@ def test_pressure_acts_on_what_it_meets_first():
     only = solver.surface_pressure(wall, 1000.0, blocks=np.array([1]))
     assert not only[0].any()
     assert only[1] == pytest.approx(down[1])
-    with pytest.raises(ValueError, match="direction is"):
-        solver.surface_pressure(wall, 1.0, (0.0, 0.0))
 
 
 def test_pressure_on_an_edge_pushes_into_the_block():

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from structures import box, drawn, rectangle
+from structures import begun, box, case_from, drawn, rectangle
 
 import blockvis
 import solver
@@ -28,25 +28,27 @@ force = {force}
 """
 
 
-def loads_of(tmp_path, more, force="[0, -500]"):
-    path = tmp_path / "case.toml"
-    path.write_text(CASE.format(force=force, more=more), encoding="utf-8")
-    run = blockvis.run_case(path, tmp_path / "out", overwrite=True, outputs=())
-    assembly = run.response.assembly
-    return assembly, run.response.loads.dead - solver.self_weight(assembly).dead
+def loads_of(more, force="[0, -500]"):
+    return loads_in(CASE.format(force=force, more=more))
 
 
-def test_the_sum_is_the_force_however_many_blocks_are_named(tmp_path):
-    assembly, loads = loads_of(tmp_path, "point = [0.3, 0.25]")
+def loads_in(text, folder=None):
+    """The assembly of a case, and its dead loads beside self-weight."""
+    response = begun(case_from(text, folder))
+    return response.assembly, response.loads.dead - solver.self_weight(response.assembly).dead
+
+
+def test_the_sum_is_the_force_however_many_blocks_are_named():
+    assembly, loads = loads_of("point = [0.3, 0.25]")
     assert np.flatnonzero(loads.any(axis=1)).size == 1
     np.testing.assert_allclose(loads[:, :2].sum(axis=0), [0.0, -500.0])
     (block,) = np.flatnonzero(loads.any(axis=1))
     assert loads[block, 2] == pytest.approx(-500.0 * (0.3 - assembly.centroids[block, 0]))
 
 
-def test_a_point_far_outside_the_one_block_that_is_named_is_told(tmp_path):
+def test_a_point_far_outside_the_one_block_that_is_named_is_told():
     with pytest.warns(UserWarning, match=r"point \(0.3, 50\) lies 49\.\d m outside block 'brick 4-2'.*is it in m"):
-        loads_of(tmp_path, 'blocks = "brick 4-2"\npoint = [0.3, 50]')
+        loads_of('blocks = "brick 4-2"\npoint = [0.3, 50]')
 
 
 def test_axles_move_together_and_are_told_by_the_first(tmp_path):
@@ -69,59 +71,43 @@ def test_axles_move_together_and_are_told_by_the_first(tmp_path):
     assert blockvis.open_results(tmp_path / "out").loads.live.sum(axis=0)[1] == pytest.approx(-1500.0)
 
 
-def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):
+def test_between_two_blocks_the_force_goes_into_the_one_it_pushes():
     course = float(np.ptp(blockvis.generators.wall(bricks=4, courses=4).outline(2)[:, 1]))
     blocks = {}
     for force in ("[0, -500]", "[0, 500]"):
-        assembly, loads = loads_of(tmp_path, f"point = [0.3, {2 * course}]", force)
+        assembly, loads = loads_of(f"point = [0.3, {2 * course}]", force)
         (block,) = np.flatnonzero(loads.any(axis=1))
         blocks[force] = assembly.centroids[block, 1]
     assert blocks["[0, -500]"] < 2 * course < blocks["[0, 500]"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("sense", [1, -1])
 def test_edges_are_counted_from_the_first_corner_in_whichever_sense_it_is_drawn(tmp_path, sense):
     """Edge 2 of a trapezoid that begins at its lower left corner is its right flank, a metre high."""
     trapezoid = np.array([[0, 0], [1, 0], [1, 1], [0.2, 1]])
     stone = trapezoid if sense > 0 else np.roll(trapezoid[::-1], 1, axis=0)
     drawn(tmp_path / "stone.json", [stone, rectangle(0, -1, 1, 0)], ["stone", "ground"], role=[None, "fixed"])
-    case = '[geometry]\nfile = "stone.json"\n[analysis]\nkind = "limit load"\n[output]\nanimation = false\n'
-    (tmp_path / "case.toml").write_text(
-        case + '[[loads]]\nkind = "live"\npressure = 1000.0\nblocks = "stone"\nedge = 2\n', encoding="utf-8"
-    )
-    live = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=()).response.loads.live
-    np.testing.assert_allclose(live[0, :2], [-1000.0, 0.0])
+    text = '[geometry]\nfile = "stone.json"\n[analysis]\nkind = "limit load"\n'
+    text += '[[loads]]\nkind = "live"\npressure = 1000.0\nblocks = "stone"\nedge = 2\n'
+    np.testing.assert_allclose(begun(case_from(text, tmp_path)).loads.live[0, :2], [-1000.0, 0.0])
 
 
-@pytest.mark.slow
-def test_in_space_the_block_is_found_by_its_faces(tmp_path):
+def test_in_space_the_block_is_found_by_its_faces():
     corner = blockvis.generators.build("L corner", {})
     chosen = np.flatnonzero(corner.free)[::3]
-    text = '[geometry]\nlayout = "L corner"\n[settlement]\ndirection = [0, 0, -1]\nincrement = 1e-3\nlimit = 1e-3\n'
-    text += "[output]\nanimation = false\n"
+    text = '[geometry]\nlayout = "L corner"\n[settlement]\ndirection = [0, 0, -1]\n'
     for block in chosen:
         text += f"[[loads]]\nforce = [0, 0, {-1e-3 * (block + 1)}]\npoint = {corner.centroids[block].tolist()}\n"
-    path = tmp_path / "case.toml"
-    path.write_text(text, encoding="utf-8")
-    response = blockvis.run_case(path, tmp_path / "out", outputs=()).response
-    added = response.loads.dead[:, 2] - solver.self_weight(response.assembly).dead[:, 2]
     expected = np.zeros(corner.n_blocks)
     expected[chosen] = -1e-3 * (chosen + 1)
-    np.testing.assert_allclose(added, expected, atol=1e-9)
+    np.testing.assert_allclose(loads_in(text)[1][:, 2], expected, atol=1e-9)
 
 
 def test_a_moment_in_space_acts_on_one_of_the_blocks_that_meet_at_its_point(tmp_path):
     boxes = [box((0, 0, z), (1, 1, z + 1)) for z in (-1, 0, 1)]
     drawn(tmp_path / "pile.json", boxes, role=["moving", None, None])
-    path = tmp_path / "case.toml"
-    path.write_text(
-        '[geometry]\nfile = "pile.json"\n[settlement]\ndirection = [0, 0, -1]\nincrement = 1e-3\nlimit = 1e-3\n'
-        "[[loads]]\nmoment = [0, 100, 0]\npoint = [0.5, 0.5, 1]\n",
-        encoding="utf-8",
-    )
-    response = blockvis.run_case(path, tmp_path / "out", outputs=()).response
-    added = response.loads.dead - solver.self_weight(response.assembly).dead
+    text = '[geometry]\nfile = "pile.json"\n[settlement]\ndirection = [0, 0, -1]\n'
+    _, added = loads_in(text + "[[loads]]\nmoment = [0, 100, 0]\npoint = [0.5, 0.5, 1]\n", tmp_path)
     np.testing.assert_allclose(added[1:].sum(axis=0), [0.0, 0.0, 0.0, 0.0, 100.0, 0.0], atol=1e-9)
 
 
@@ -135,15 +121,17 @@ def test_a_point_in_no_block_names_the_nearest(tmp_path, capsys):
     assert message.count("\n") == 1
 
 
-def test_a_force_on_many_blocks_is_told_with_its_sum(tmp_path):
+def test_a_force_on_many_blocks_is_told_with_its_sum():
     with pytest.warns(UserWarning, match=r"acts on each of 18 blocks that blocks = '\*' names, 9 kN in all"):
-        _, loads = loads_of(tmp_path, "")
+        _, loads = loads_of("")
     np.testing.assert_allclose(loads[:, :2].sum(axis=0), [0.0, -9000.0])
 
 
 def test_notes_of_reopened_results_name_the_file_of_the_case(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.format(force="[0, -500]", more=""), encoding="utf-8")
     with pytest.warns(UserWarning, match="acts on each of 18 blocks"):
-        loads_of(tmp_path, "")
+        blockvis.run_case(path, tmp_path / "out", outputs=())
     with pytest.warns(UserWarning, match="acts on each of 18 blocks") as noted:
         blockvis.open_results(tmp_path / "out")
     assert {str(note.message).partition(": [loads 1]")[0] for note in noted} == {str(tmp_path / "case.toml")}

@@ -26,22 +26,16 @@ def test_response_plots_itself_once_blockvis_is_imported():
     assert "voussoir 1" not in shown.split("srcdoc")[0]
 
 
-@pytest.fixture(scope="module")
-def collapsed():
-    spread = solver.Settlement(direction=(1, 0), increment=0.1, limit=0.5)
-    return solver.settle(generators.arch(voussoirs=5), spread, friction_coefficient=2.0)
-
-
 @pytest.mark.slow
-def test_a_response_is_shown_by_its_pictures_and_numbers(collapsed):
-    shown = collapsed._repr_html_()
+def test_a_response_is_shown_by_its_pictures_and_numbers(arch):
+    shown = arch._repr_html_()
     pictures = [base64.b64decode(data) for data in re.findall(r"base64,([A-Za-z0-9+/=]+)", shown)]
     sizes = [Image.open(io.BytesIO(picture)).size for picture in pictures]
     assert np.prod(sizes[0]) == pytest.approx(1280 * 720, rel=5e-3)
     assert [int(width) for width in re.findall(r'width="(\d+)"', shown)] == [width // 2 for width, _ in sizes]
     assert len(sizes) == 2, "the mechanism and the curve"
     assert all(np.ptp(np.asarray(Image.open(io.BytesIO(picture)))) > 100 for picture in pictures), "something is drawn"
-    assert f"{collapsed.collapse.displacement:.6g} m" in shown
+    assert f"{arch.collapse.displacement:.6g} m" in shown
     assert "array(" not in shown
 
 
@@ -59,13 +53,13 @@ def test_a_response_without_increments_is_shown_by_its_message():
     assert "why &amp; &lt;how&gt;" in empty._repr_html_()
 
 
-def test_a_collapse_is_shown_by_its_numbers(collapsed):
-    shown = ElementTree.fromstring(collapsed.collapse._repr_html_())
+def test_a_collapse_is_shown_by_its_numbers(arch):
+    shown = ElementTree.fromstring(arch.collapse._repr_html_())
     rows = {row[0].text: row[1].text for row in shown.iter("tr")}
-    low, high = collapsed.collapse.bracket
+    low, high = arch.collapse.bracket
     assert rows["equilibrium at"] == f"{low:.6g} m"
     assert rows["no equilibrium at"] == f"{high:.6g} m"
-    assert rows["mechanism"] == collapsed.collapse.words
+    assert rows["mechanism"] == arch.collapse.words
 
 
 def test_an_assembly_is_shown_block_by_block():

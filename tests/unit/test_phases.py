@@ -563,7 +563,8 @@ def test_a_folder_is_reopened_after_a_tie_has_been_taken_away(
         'to = { block = "right springer", point = [1, 0] }\nstiffness = 1e5\n'
     )
     removed = '[[remove]]\nphase = 2\nties = ["iron"]\n'
-    run_told(tmp_path, ARCH + 2 * SPREADING.replace("0.1", "0.05") + tie + removed, capsys)
+    steps = SPREADING.replace("increment = 0.05\nlimit = 0.1", "increment = 0.002\nlimit = 0.002")
+    run_told(tmp_path, ARCH + 2 * steps + tie + removed, capsys)
     (change,) = blockvis.open_results(tmp_path / "out").changes
     assert (change.phase, change.ties) == (1, ("iron",))
     assert main(["report", str(tmp_path / "out")]) == 0

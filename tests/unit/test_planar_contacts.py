@@ -108,26 +108,12 @@ def test_every_joint_has_a_contact_at_each_end(name, angle):
     assert_joints_have_a_contact_at_each_end(contacts, ends)
 
 
-def test_two_stacked_bricks_have_two_contacts():
-    assert len(find(LAYOUTS["two bricks"])[1]) == 2
-
-
-def test_diagonal_neighbours_in_stack_bond_do_not_touch():
-    _, contacts = find(LAYOUTS["stack bond"])
+@pytest.mark.parametrize("angle", [0.0, 0.3, 0.7, 1.0, 2.5])
+def test_diagonal_neighbours_in_stack_bond_do_not_touch(angle):
+    _, contacts = find([turned(outline, angle, (0, 0)) for outline in LAYOUTS["stack bond"]])
     apart = np.abs(contacts.block_a - contacts.block_b)
     assert set(apart.tolist()) == {1, 3}
     assert len(contacts) == 2 * 12
-
-
-def test_diagonal_neighbours_in_turned_stack_bond_do_not_touch():
-    for angle in (0.3, 0.7, 1.0, 2.5):
-        _, contacts = find([turned(outline, angle, (0, 0)) for outline in LAYOUTS["stack bond"]])
-        assert len(contacts) == 2 * 12
-
-
-def test_running_bond_has_the_contacts_its_joints_have():
-    """Courses of 4 and 5 blocks: 8 bed joints between them, 3 and 4 head joints in them, two points each."""
-    assert len(find(running_bond(4, 5))[1]) == 2 * (4 * 8 + 3 * 3 + 2 * 4)
 
 
 @pytest.mark.parametrize("size", [1e-3, 1e-2, 1.0, 10.0])

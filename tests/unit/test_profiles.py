@@ -110,9 +110,13 @@ def test_s_is_the_largest_displacement_of_a_support():
         ({"profile": {"a": (1.0, 0.0)}}, r"profile of 'a' is \[1.0, 0.0\]; give \[dx, dy, rotation\]"),
         ({"profile": {"a": (np.nan, 0.0, 0.0)}}, "profile of 'a'"),
         ({"profile": {"a": (1.0, 0.0, 0.0)}, "direction": (1, 0)}, "give no direction"),
+        ({"profile": {"a": (1.0, 0.0, 0.0)}, "profile_arms": {"b": (0.0, 1.0)}}, "profile_arms of 'b'"),
+        ({"profile": {"a": (1.0, 0.0, 0.0)}, "profile_arms": {"a": (0.0, 1.0, 0.0)}}, "give 2 numbers"),
+        ({"direction": (0, -1), "profile_arms": {"a": (0.0, 1.0)}}, "with a profile"),
+        ({"profile_arms": {"a": (0.0, 1.0)}}, "moves no support"),
     ],
 )
-def test_profiles_that_are_none_are_refused(keys, words):
+def test_profiles_that_are_none_and_arms_without_their_support_are_refused(keys, words):
     with pytest.raises(ValueError, match=words):
         solver.Settlement(**keys)
 
@@ -197,20 +201,6 @@ def test_a_support_moves_and_turns_at_the_end_of_its_arm():
     step = 1e-6
     by_difference = (motion.displaced(arch, start, 0.1 + step).positions - after.positions)[springer] / step
     np.testing.assert_allclose(motion.rate(arch, start, 0.1)[springer, :2], by_difference, atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"profile": {"a": (1.0, 0.0, 0.0)}, "profile_arms": {"b": (0.0, 1.0)}}, "profile_arms of 'b'"),
-        ({"profile": {"a": (1.0, 0.0, 0.0)}, "profile_arms": {"a": (0.0, 1.0, 0.0)}}, "give 2 numbers"),
-        ({"direction": (0, -1), "profile_arms": {"a": (0.0, 1.0)}}, "with a profile"),
-        ({"profile_arms": {"a": (0.0, 1.0)}}, "moves no support"),
-    ],
-)
-def test_arms_without_their_support_are_refused(keys, words):
-    with pytest.raises(ValueError, match=words):
-        solver.Settlement(**keys)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 import solver
@@ -76,7 +76,7 @@ def _wall():
 CASES = {
     "hinging arch": _case(generators.arch(embrace=140, thickness_ratio=0.12, voussoirs=8), 2.0, (1, 0), 0.02, 0.5),
     "sliding arch": _case(generators.arch(thickness_ratio=0.3, voussoirs=7), 0.35, (1, 0), 0.02, 0.5),
-    "sinking wall": _case(_wall(), 0.5, (0.0, -1.0), 0.05, 0.1),
+    "sinking wall": _case(_wall(), 0.5, (0.0, -1.0), 0.05, 0.05),
 }
 
 
@@ -128,14 +128,10 @@ def test_cases_collapse_slide_and_settle():
 @ARCHES_THOROUGHLY
 @few
 @given(angle=st.floats(-np.pi, np.pi))
+@example(angle=np.pi / 2)
+@example(angle=np.pi)
 def test_frame(name, angle):
     assert_same(name, CASES[name].mapped(rotation(angle)).settle())
-
-
-@ARCHES_THOROUGHLY
-def test_quarter_turns(name):
-    for angle in (np.pi / 2, np.pi):
-        assert_same(name, CASES[name].mapped(rotation(angle)).settle())
 
 
 @ARCHES_THOROUGHLY
@@ -186,8 +182,8 @@ def test_blocks_that_sink_along_a_head_joint_do_not_move_sideways(scale):
     response = replace(
         case,
         outlines=tuple(scale * outline for outline in case.outlines),
-        increment=scale * case.increment,
-        limit=scale * case.limit,
+        increment=scale * 0.05,
+        limit=scale * 0.1,
     ).settle()
     for increment in response.path:
         moved = increment.pose.displacements(response.assembly)

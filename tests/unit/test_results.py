@@ -16,71 +16,58 @@ from blockvis.cli import main
 from solver import mechanics
 
 
-@pytest.fixture(scope="module")
-def response():
-    spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
-    return solver.settle(
-        generators.arch(), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=3)
-    )
-
-
-@pytest.fixture(scope="module")
-def folder(response, tmp_path_factory):
-    return blockvis.write(response, tmp_path_factory.mktemp("results") / "out")
-
-
-def test_reopens_as_the_same_response(response, folder):
-    again = blockvis.open_results(folder)
-    assert again.stop == response.stop
-    assert again.collapse.bracket == response.collapse.bracket
-    assert again.assembly.names == response.assembly.names
-    assert len(again.increments) == len(response.increments)
-    for one, other in zip(again.increments, response.increments, strict=True):
+def test_reopens_as_the_same_response(arch, arch_folder):
+    again = blockvis.open_results(arch_folder)
+    assert again.stop == arch.stop
+    assert again.collapse.bracket == arch.collapse.bracket
+    assert again.assembly.names == arch.assembly.names
+    assert len(again.increments) == len(arch.increments)
+    for one, other in zip(again.increments, arch.increments, strict=True):
         assert one.settlement == other.settlement
         assert one.reaction == other.reaction
         assert np.array_equal(one.pose.positions, other.pose.positions)
         assert np.array_equal(one.forces, other.forces)
         assert np.array_equal(one.states, other.states)
         assert equal_certificates(one.certificate, other.certificate)
-    np.testing.assert_allclose(again.collapse.mechanism, response.collapse.mechanism, rtol=1e-12)
+    np.testing.assert_allclose(again.collapse.mechanism, arch.collapse.mechanism, rtol=1e-12)
 
 
-def test_a_collapse_without_frames_of_its_fall_comes_back_with_its_mechanism(response, tmp_path):
-    bare = replace(response, increments=response.path)
+def test_a_collapse_without_frames_of_its_fall_comes_back_with_its_mechanism(arch, tmp_path):
+    bare = replace(arch, increments=arch.path)
     again = blockvis.open_results(blockvis.write(bare, tmp_path / "out"))
-    assert len(again.increments) == len(response.path)
-    np.testing.assert_allclose(again.collapse.mechanism, response.collapse.mechanism, rtol=1e-12)
-    assert np.array_equal(again.path[-1].pose.positions, response.path[-1].pose.positions)
+    assert len(again.increments) == len(arch.path)
+    np.testing.assert_allclose(again.collapse.mechanism, arch.collapse.mechanism, rtol=1e-12)
+    assert np.array_equal(again.path[-1].pose.positions, arch.path[-1].pose.positions)
     for words in ("<td>mechanism</td>", "<td>falls</td>"):
         assert words in report_of(again)
 
 
-def test_csv_counts_every_contact_once(response, folder):
-    rows = list(csv.DictReader((folder / "response.csv").read_text(encoding="utf-8").splitlines()))
-    for row, increment in zip(rows, response.path, strict=True):
+def test_csv_counts_every_contact_once(arch, arch_folder):
+    rows = list(csv.DictReader((arch_folder / "response.csv").read_text(encoding="utf-8").splitlines()))
+    for row, increment in zip(rows, arch.path, strict=True):
         counted = sum(int(row[f"contacts_{s}"]) for s in ("open", "sticking", "sliding", "hinging"))
         assert counted == len(increment.contacts)
 
 
-def test_summary_reports_the_worst_residuals(response, folder):
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    worst = max(i.certificate.equilibrium_residual for i in response.path)
+def test_summary_reports_the_worst_residuals(arch, arch_folder):
+    summary = json.loads((arch_folder / "summary.json").read_text(encoding="utf-8"))
+    worst = max(i.certificate.equilibrium_residual for i in arch.path)
     assert summary["largest_residuals"]["equilibrium_residual"] == worst
     assert worst < 1e-8
 
 
-def test_the_last_equilibrium_has_the_joints_of_the_collapse_in_every_file(response, folder):
-    *_, row = csv.DictReader((folder / "response.csv").read_text(encoding="utf-8").splitlines())
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    again, states = blockvis.open_results(folder), ("open", "sticking", "sliding", "hinging")
+def test_the_last_equilibrium_has_the_joints_of_the_collapse_in_every_file(arch, arch_folder, tmp_path):
+    *_, row = csv.DictReader((arch_folder / "response.csv").read_text(encoding="utf-8").splitlines())
+    summary = json.loads((arch_folder / "summary.json").read_text(encoding="utf-8"))
+    again, states = blockvis.open_results(arch_folder), ("open", "sticking", "sliding", "hinging")
     told = np.bincount(again.contacts(-1)["state"], minlength=len(states))
     assert [int(row[f"contacts_{state}"]) for state in states] == told.tolist()
     joints = [int(row[name]) for name in ("hinges", "sliding_joints")]
     assert joints == [summary[name] for name in ("hinges", "sliding_joints")]
-    alone = mechanics.mechanism_of(response.assembly, response.path[-1])
+    alone = mechanics.mechanism_of(arch.assembly, arch.path[-1])
     assert joints != [len(alone.hinges), len(alone.sliding)], "the motion in which the supports move on has others"
     assert len(again.increments[0].contacts) != summary["n_contacts"]
-    report = blockvis.write_report(again, folder.parent / "report.html").read_text(encoding="utf-8")
+    report = blockvis.write_report(again, tmp_path / "report.html").read_text(encoding="utf-8")
     assert f"<td>contact points</td><td>{summary['n_contacts']}</td>" in report
 
 
@@ -94,17 +81,17 @@ def test_linear_programs_word_their_mechanism_as_the_summary_does(tmp_path):
     assert summary["message"].endswith(summary["mechanism"])
 
 
-def test_results_that_lack_their_last_states_are_refused(response, folder, tmp_path):
+def test_results_that_lack_their_last_states_are_refused(arch, arch_folder, tmp_path):
     """As a copy that broke off leaves them: they would open as a shorter path."""
-    copy = shutil.copytree(folder, tmp_path / "copy")
-    for number in range(2, len(response.increments)):
+    copy = shutil.copytree(arch_folder, tmp_path / "copy")
+    for number in range(2, len(arch.increments)):
         (copy / "increments" / f"state_{number:05d}.npz").unlink()
     with pytest.raises(ValueError, match=r"state_00002\.npz' cannot be read .* run the case again"):
         blockvis.open_results(copy)
 
 
-def test_what_colours_the_files_in_paraview_needs_no_picture(folder):
-    assert (folder / "paraview_colours.py").is_file()
+def test_what_colours_the_files_in_paraview_needs_no_picture(arch_folder):
+    assert (arch_folder / "paraview_colours.py").is_file()
 
 
 def test_no_results(tmp_path):
@@ -112,9 +99,9 @@ def test_no_results(tmp_path):
         blockvis.open_results(tmp_path)
 
 
-def test_refuses_to_overwrite(response, folder):
+def test_refuses_to_overwrite(arch, arch_folder):
     with pytest.raises(ValueError, match=r"holds results already .*add --force \(in Python overwrite=True\)"):
-        blockvis.write(response, folder)
+        blockvis.write(arch, arch_folder)
 
 
 def test_the_worst_of_some_certificates_passes_over_what_was_not_worked_out():
@@ -200,25 +187,25 @@ def test_a_case_changed_in_python_reopens_as_it_ran(tmp_path):
     assert blockvis.open_results(run.folder).interfaces == run.response.interfaces, "as of a run that was killed"
 
 
-def test_no_name_is_no_folder(response, tmp_path, monkeypatch):
+def test_no_name_is_no_folder(arch, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ValueError, match="name the folder of the results"):
-        blockvis.write(response, "")
+        blockvis.write(arch, "")
     with pytest.raises(ValueError, match="'' is no page"):
-        blockvis.write_report(response, "")
+        blockvis.write_report(arch, "")
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", ["report.pdf", "report.png", "report"])
-def test_a_report_is_a_page_by_its_name(response, tmp_path, name):
+def test_a_report_is_a_page_by_its_name(arch, tmp_path, name):
     with pytest.raises(ValueError, match=r"is no page; end its name in \.html or \.htm, or let 'blockvis"):
-        blockvis.write_report(response, tmp_path / name)
+        blockvis.write_report(arch, tmp_path / name)
 
 
-def test_results_opened_by_a_relative_path_are_read_from_another_folder(folder, tmp_path, monkeypatch):
+def test_results_opened_by_a_relative_path_are_read_from_another_folder(arch_folder, tmp_path, monkeypatch):
     monkeypatch.setattr("blockvis.results.increments.CACHED", 0)
-    monkeypatch.chdir(folder.parent)
-    again = blockvis.open_results(folder.name)
+    monkeypatch.chdir(arch_folder.parent)
+    again = blockvis.open_results(arch_folder.name)
     monkeypatch.chdir(tmp_path)
     assert all(len(increment.forces) for increment in again.path)
 

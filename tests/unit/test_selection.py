@@ -236,8 +236,6 @@ blocks = "stone [1]"
 direction = [0, -1]
 limit = 0.01
 increment = 0.01
-[output]
-animation = false
 """
-    run = run_case(case_from(text, tmp_path), tmp_path / "results")
+    run = run_case(case_from(text, tmp_path), tmp_path / "results", outputs=())
     assert run.response.path[-1].removed.tolist() == [True, False, False]

@@ -142,18 +142,6 @@ def test_limit_load_is_a_response_of_its_own(block, tmp_path):
     assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["limit_load_multiplier"] == pytest.approx(0.5)
 
 
-@pytest.mark.thorough
-def test_datasets_of_an_increment():
-    response = solver.Structure(generators.arch(), friction_coefficient=2.0).settle((1, 0))
-    last = response.path[-1]
-    k = len(response.path) - 1
-    contacts = response.contacts(k)
-    assert contacts.n_cells == len(last.contacts)
-    assert np.asarray(contacts["normal_force"]) == pytest.approx(last.forces[:, 0])
-    assert response.mesh(k).n_cells == response.assembly.n_blocks
-    assert response.joints(k)["opening"].max() > 0.0
-
-
 def test_what_is_analysed_shows_itself_in_a_notebook():
     structure = solver.Structure(generators.arch(), friction_coefficient=2.0)
     assert "<svg" in structure._repr_html_()

@@ -67,31 +67,6 @@ def assembled(tmp_path, text):
 COLUMN = '[geometry]\nlayout = "column"\n'
 
 
-@pytest.mark.parametrize(
-    ("keys", "note"),
-    [
-        (
-            "[material]\nfriction_coefficient = 35",
-            "friction_coefficient = 35 is a slope of 88.4 degrees; .* tangent, 0.7",
-        ),
-        ("[material]\ndensity = 2.0", "density 2 kg/m³ is lighter than masonry; if it is in t/m³, give 2000 kg/m³"),
-        ("[material]\ndensity = 20", "density 20 kg/m³ is lighter than masonry; if it is in kN/m³, give 2039 kg/m³"),
-        ("thickness = 300", r"\[geometry\] thickness = 300 m is deeper than any wall .* is in mm, give 0.3 m"),
-        (
-            "[settlement]\ndirection = [0, -1]\nincrement = 5\nlimit = 100",
-            "increment = 5 m is .* times the size of the median block, .* m: is it in mm\\? 0.005 m",
-        ),
-        (
-            "[settlement]\nrotation_centre = [800, -1500]\nincrement = 1e-4\nlimit = 1e-3",
-            r"rotation_centre = \[800.0, -1500.0\] m .* away from it: is it in mm\? \[0.8, -1.5\] m",
-        ),
-    ],
-)
-def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
-    with pytest.warns(UserWarning, match=note):
-        assembled(tmp_path, COLUMN + keys)
-
-
 def test_an_increment_of_more_than_the_whole_structure_is_refused(tmp_path):
     """After 15 s of a run a wall had sunk by 107 mm, in steps of 1 mm, of 10 m."""
     said = r"increment = 50 m is .* and the whole is 18 m: if it is in mm, give 0\.05, else at most 18$"
@@ -116,6 +91,21 @@ FILL = '[[backfill]]\nover = "*"\nsurface = 9\n'
 @pytest.mark.parametrize(
     ("keys", "note"),
     [
+        (
+            "[material]\nfriction_coefficient = 35",
+            "friction_coefficient = 35 is a slope of 88.4 degrees; .* tangent, 0.7",
+        ),
+        ("[material]\ndensity = 2.0", "density 2 kg/m³ is lighter than masonry; if it is in t/m³, give 2000 kg/m³"),
+        ("[material]\ndensity = 20", "density 20 kg/m³ is lighter than masonry; if it is in kN/m³, give 2039 kg/m³"),
+        ("thickness = 300", r"\[geometry\] thickness = 300 m is deeper than any wall .* is in mm, give 0.3 m"),
+        (
+            "[settlement]\ndirection = [0, -1]\nincrement = 5\nlimit = 100",
+            "increment = 5 m is .* times the size of the median block, .* m: is it in mm\\? 0.005 m",
+        ),
+        (
+            "[settlement]\nrotation_centre = [800, -1500]\nincrement = 1e-4\nlimit = 1e-3",
+            r"rotation_centre = \[800.0, -1500.0\] m .* away from it: is it in mm\? \[0.8, -1.5\] m",
+        ),
         ("[material]\ndensity = 0.5", "density 0.5 kg/m³ is lighter than masonry; if it is in t/m³, give 500 kg/m³"),
         (
             "[material]\ndensity = 18000",
@@ -141,7 +131,7 @@ FILL = '[[backfill]]\nover = "*"\nsurface = 9\n'
         ),
     ],
 )
-def test_numbers_a_power_of_ten_off_are_named(tmp_path, keys, note):
+def test_likely_unit_mistakes_and_numbers_a_power_of_ten_off_are_named(tmp_path, keys, note):
     with pytest.warns(UserWarning, match=note):
         assembled(tmp_path, COLUMN + keys)
 
@@ -161,19 +151,14 @@ def test_strengths_of_interfaces_are_doubted_too(tmp_path):
         TIE + "area = 1e-8\nmodulus = 1e6",
         TIE + "area = 4\nmodulus = 1.2e12",
         FILL + "unit_weight = 200",
+        # Steps within an increment are chosen by their own error, however long it is.
+        "[settlement]\ndirection = [0, -1]\nincrement = 0.3\nlimit = 0.6",
     ],
 )
-def test_models_of_lead_rubber_and_foam_are_not_doubted(tmp_path, keys):
+def test_models_of_lead_rubber_and_foam_and_long_increments_within_a_block_are_not_doubted(tmp_path, keys):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assembled(tmp_path, COLUMN + keys)
-
-
-def test_long_increments_within_a_block_are_not_noted(tmp_path):
-    """Steps within an increment are chosen by their own error, however long it is."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assembled(tmp_path, COLUMN + "[settlement]\ndirection = [0, -1]\nincrement = 0.3\nlimit = 0.6")
 
 
 def test_a_unit_in_doubt_stops_a_run_until_the_case_gives_one(tmp_path, capsys):

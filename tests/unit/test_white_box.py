@@ -41,7 +41,7 @@ WHITE_BOX = {
     "unit/test_observations.py": 1,
     "unit/test_programs.py": 16,
     "unit/test_refusal_pictures.py": 8,
-    "unit/test_render.py": 11,
+    "unit/test_render.py": 10,
     "unit/test_studies.py": 18,
     "unit/test_ties.py": 5,
     "unit/test_tolerances.py": 1,
