@@ -10,6 +10,7 @@ from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_changes, case_interfaces, case_loads
 from blockvis.cases.contents import Case
 from blockvis.cases.loads import with_moving_load
+from blockvis.cases.profiles import with_profiles
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import stored_response
 from blockvis.results.given import with_given
@@ -39,7 +40,8 @@ def open_results(folder: str | Path) -> solver.Response:
         return with_given(folder, response)
     if "parameter" not in summary:
         # The run was stopped before it wrote a summary.
-        course = kind.course(case)
+        settlements = with_profiles(case.settlements, case.profiles, response.assembly, case.source)
+        course = kind.course(replace(case, settlements=settlements, profiles=()))
         response = replace(
             response,
             settlements=course.settlements,

@@ -218,6 +218,8 @@ def test_ground_that_was_cut_is_named_by_its_name_or_its_pieces(tmp_path, blocks
     response = blockvis.run_case(case_from(text), tmp_path / "out", outputs=()).response
     assert response.settlements[1].blocks == tuple(f"ground {k}" for k in sorted(moved))
     assert response.path[-1].phase == 1
+    (tmp_path / "out" / "summary.json").unlink()
+    assert blockvis.open_results(tmp_path / "out").settlements == response.settlements, "as of a run that was killed"
 
 
 @pytest.mark.slow

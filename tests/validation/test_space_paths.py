@@ -142,7 +142,9 @@ def test_a_dome_stands_on_a_ring_of_which_half_sinks():
     supports = np.where(np.array(middle) > 1e-9, "moving", "fixed")
     stones = replace(stones, roles=np.where(stones.free, "free", supports))
     sinking = solver.Settlement(direction=(0, 0, -1), increment=0.02, limit=0.06)
-    response = solver.settle(stones, sinking, friction_coefficient=0.7)
+    # Where stones slip a little sooner or later R is off by 5 % with the default.
+    controls = solver.Controls(step_tolerance=0.00125)
+    response = solver.settle(stones, sinking, friction_coefficient=0.7, controls=controls)
     assert response.stop is solver.Status.LIMIT_REACHED
     assert len(response.path) == 4
     assert max(i.certificate.equilibrium_residual for i in response.path) < 1e-8
