@@ -298,8 +298,8 @@ class Path:
         if resting is not None and not carries:
             resting = self.stepper.standing(resting) or resting
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
-        # Blocks that rest far away may have left an equilibrium in a step that was too long.
-        if resting is None or (is_far and state.refine_until < place.s):
+        # Blocks that rest far away may have left an equilibrium in a step that was too long, where none has been left.
+        if resting is None or (is_far and state.refine_until < place.s and state.history[0].s <= state.reported):
             self.state = self._go_back(state, place.s)
             return
         if is_far:
