@@ -298,8 +298,8 @@ class Path:
         if resting is not None and not carries:
             resting = self.stepper.standing(resting) or resting
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
-        # Blocks that rest far away may have left an equilibrium in a step that was too long, where none has been left.
-        if resting is None or (is_far and state.refine_until < place.s and state.history[0].s <= state.reported):
+        # Blocks that rest far away may have left an equilibrium in a step that was too long.
+        if resting is None or (is_far and state.refine_until < place.s):
             self.state = self._go_back(state, place.s)
             return
         if is_far:
@@ -416,7 +416,7 @@ class Path:
         state = replace(state, place=on_path, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
-            until = s + ENCLOSED * self.driver.tolerance
+            until = max(state.refine_until, s + ENCLOSED * self.driver.tolerance)
             state = replace(state, upper_bound=np.inf, refine_until=until)
         return state, None
 
@@ -465,17 +465,19 @@ class Path:
         # Of a live load that has viscosity in it more than a step may err by.
         if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
             return new
-        return None if refining else self.fall.relaxed(new, JUMP)
+        return None if np.isfinite(state.upper_bound) else self.fall.relaxed(new, JUMP)
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
-        """Go back to the last place in equilibrium from a parameter that has none."""
+        """Go back to the last place in equilibrium from a parameter that has none, up to which viscosity stays reduced."""
+        until = max(state.refine_until, bound)
         # The oldest place is in equilibrium: it was reported, or is the start.
         oldest, *later = state.history
         places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < bound)]
         while len(places) > 1 and not self.checks.in_equilibrium(places[-1], self.closed_gap):
             bound = min(bound, places.pop().s)
         step = (bound - places[-1].s) / 4.0
-        return replace(state, place=places[-1], step=step, upper_bound=bound, history=tuple(places[:-1]))
+        place, history = places[-1], tuple(places[:-1])
+        return replace(state, place=place, step=step, upper_bound=bound, refine_until=until, history=history)
 
     def _supports_locked(self, place: Place) -> bool:
         """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""

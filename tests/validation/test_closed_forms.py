@@ -48,8 +48,8 @@ def test_flat_arch(height, friction_coefficient):
     exact = 2 * (span - 1)
     assert response.stop is solver.Status.COLLAPSED
     # Where friction only just suffices it lags the thrust, which grows without bound: 1.7e-3 of the collapse, with a
-    # quarter of the step tolerance 1.0e-3.
-    lag = 2e-3 * exact if friction_coefficient < 2.0 else 1e-6
+    # quarter of the step tolerance 1.0e-3. Otherwise joints give under a thrust without limit.
+    lag = (2e-3 if friction_coefficient < 2.0 else 2.5e-4) * exact
     assert response.collapse.displacement == pytest.approx(exact, abs=max(1e-3 * exact, lag))
     low, high = response.collapse.bracket
     # Just before the snap blocks move a hundred times as fast as the support, and the viscosity holds them a little.
