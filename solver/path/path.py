@@ -468,7 +468,7 @@ class Path:
         return None if np.isfinite(state.upper_bound) else self.fall.relaxed(new, JUMP)
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
-        """Go back to the last place in equilibrium from a parameter that has none, up to which viscosity stays reduced."""
+        """Go back to the last place in equilibrium; up to a parameter that has none viscosity stays reduced."""
         until = max(state.refine_until, bound)
         # The oldest place is in equilibrium: it was reported, or is the start.
         oldest, *later = state.history
