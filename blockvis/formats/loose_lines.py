@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import chain, compress
 from typing import Any
@@ -131,14 +131,19 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
     found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
     if found.faces:
-        said = f"{counted(len(found.faces), 'block is a face', 'blocks are faces')} between "
-        said += f"{counted(len(lines), 'loose line')}{f', {n_closed} of them beside outlines' if n_closed else ''}"
-        said += "; an opening enclosed by lines counts as a block too: "
-        areas = np.abs([ring_area(face.ring) for face in found.faces])
-        largest, times = int(areas.argmax()), float(areas.max() / np.median(areas))
-        doubt = f"; 'face {largest}' has {times:.2g} times the median area" if times > MAYBE_OPENING else ""
-        found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines{doubt}"))
+        found.notes.append(_openings_note(found.faces, len(lines), n_closed))
     return found
+
+
+def _openings_note(faces: Sequence[Face], n_lines: int, n_closed: int) -> Note:
+    """Tell of the faces between lines, some of them closed by outlines, and of the largest, which may be an opening."""
+    said = f"{counted(len(faces), 'block is a face', 'blocks are faces')} between {counted(n_lines, 'loose line')}"
+    said += f", {n_closed} of them beside outlines" if n_closed else ""
+    areas = np.abs([ring_area(face.ring) for face in faces])
+    largest, times = int(areas.argmax()), float(areas.max() / np.median(areas))
+    doubt = f"; 'face {largest}' has {times:.2g} times the median area" if times > MAYBE_OPENING else ""
+    remedy = f"an opening enclosed by lines counts as a block too: erase it or draw closed outlines{doubt}"
+    return Note(CHANGED, f"{said}; {remedy}")
 
 
 def _lines(drawn: Iterable[np.ndarray]) -> np.ndarray:
@@ -415,6 +420,18 @@ def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
     return bool((into & ~shapely.covers(area.buffer(reach), lines)).any())
 
 
+def _words_of(layers: Collection[str], paths: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Give the layers with those that hold them, each once and in order."""
+    return tuple(word for layer in sorted({*layers}) for word in paths[layer] if word)
+
+
+def _open_lines(lines: Sequence[Line], segments: np.ndarray, loose: Any) -> list[LeftOut]:
+    """Leave out the lines that lie in what encloses nothing."""
+    shapely.prepare(loose)
+    alone = [lines[k] for k in np.flatnonzero(shapely.covers(loose, segments)).tolist()]
+    return [line.left_out("open", _open_message(line), f"line {line.handle}") for line in alone]
+
+
 def _add_faces(
     lines: list[Line],
     segments: np.ndarray,
@@ -429,16 +446,10 @@ def _add_faces(
         return 0
     grid, paths = GRID * size, {line.layer: line.within or (line.layer,) for line in lines}
     faces, cuts, dangles, _ = shapely.polygonize_full([shapely.union_all(segments, grid_size=grid)])
-    loose = shapely.union_all([dangles, cuts]).buffer(2 * grid)
-    shapely.prepare(loose)
-    alone = [lines[k] for k in np.flatnonzero(shapely.covers(loose, segments))]
-    found.left_out += [line.left_out("open", _open_message(line), f"line {line.handle}") for line in alone]
+    found.left_out += _open_lines(lines, segments, shapely.union_all([dangles, cuts]).buffer(2 * grid))
     tree, areas = shapely.STRtree(segments), {i: shapely.Polygon(ring).buffer(0) for i, ring in outlines.items()}
-    drawn, whole, borders = (
-        shapely.STRtree([areas[i] for i in areas if i not in ignored]),
-        list[Any](),
-        list[set[int]](),
-    )
+    drawn = shapely.STRtree([areas[i] for i in areas if i not in ignored])
+    whole, borders = list[Any](), list[set[int]]()
 
     def add(face: Any) -> None:
         ring = np.array(shapely.orient_polygons(face).exterior.coords)[:-1]
@@ -456,8 +467,7 @@ def _add_faces(
             message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
             found.left_out.append(LeftOut("across", ring, message, layer, "face"))
             return
-        within = tuple(word for one in sorted({*nearest}) for word in paths[one] if word)
-        found.faces.append(Face(ring, paths[layer], within))
+        found.faces.append(Face(ring, paths[layer], _words_of(nearest, paths)))
         whole.append(face)
         borders.append({*border})
 

@@ -135,8 +135,7 @@ class SettlementKind(AnalysisKind):
                 )
             if path[0].reaction < -NOTABLE * _size(response, path[0].phase):
                 lines[-1] += "   against the movement: by itself the structure would push these supports the other way"
-            if _is_work(response):
-                lines.append(f"reactions are {WORK}")
+            lines += [f"reactions are {WORK}"] if _is_work(response) else []
             lines += _held_down(response)
             if _is_idle(response):
                 lines.append("no free block touches the supports that move: nothing follows them")
