@@ -298,8 +298,8 @@ class Path:
         if resting is not None and not carries:
             resting = self.stepper.standing(resting) or resting
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
-        # Blocks that rest far away may have left an equilibrium in a step that was too long.
-        if resting is None or (is_far and state.refine_until < place.s):
+        # Blocks that rest far away may have left an equilibrium in a step that was too long, where none has been left.
+        if resting is None or (is_far and state.refine_until < place.s and state.history[0].s <= state.reported):
             self.state = self._go_back(state, place.s)
             return
         if is_far:
@@ -412,7 +412,7 @@ class Path:
         if on_path is not new:
             # Where blocks have come to rest nothing is behind, and they are as fast as before they were.
             on_path = replace(on_path, velocity=place.velocity)
-            history = (on_path,)
+            state, history = replace(state, refine_until=-np.inf), (on_path,)
         state = replace(state, place=on_path, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
@@ -511,7 +511,7 @@ class Path:
             self.reports.notes.append((resting.s, self.reports.jump(state.place.pose, resting.pose)))
         place = replace(resting, velocity=None)
         step = FIRST_STEP * self.stepper.unit
-        return replace(state, place=place, step=step, upper_bound=np.inf, history=(place,))
+        return replace(state, place=place, step=step, upper_bound=np.inf, refine_until=-np.inf, history=(place,))
 
     def _remove_fallen(self, state: PathState, end: Place) -> PathState | None:
         """Continue without the blocks that have fallen; None where none have, too many, or the others fall, too."""
