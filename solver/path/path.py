@@ -412,7 +412,7 @@ class Path:
         if on_path is not new:
             # Where blocks have come to rest nothing is behind, and they are as fast as before they were.
             on_path = replace(on_path, velocity=place.velocity)
-            state, history = replace(state, refine_until=-np.inf), (on_path,)
+            history = (on_path,)
         state = replace(state, place=on_path, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
@@ -465,7 +465,7 @@ class Path:
         # Of a live load that has viscosity in it more than a step may err by.
         if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
             return new
-        return None if np.isfinite(state.upper_bound) else self.fall.relaxed(new, JUMP)
+        return None if refining else self.fall.relaxed(new, JUMP)
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
         """Go back to the last place in equilibrium; up to a parameter that has none viscosity stays reduced."""
