@@ -265,7 +265,8 @@ def test_the_peak_before_a_jump_is_told_and_leaves_the_path_as_it_was():
         topples = r"at [1-5](\.\d+)?e-05 m: blocks 'block 1', 'block 2' moved by up to 0.024 m at once"
         assert re.search(topples, path.notes[0])
         assert max(i.load_multiplier for i in path.path if i.parameter < 0.002) < 0.86
-    assert [max(path.load_multiplier) for path in paths] == pytest.approx([0.895] * 2, rel=0.01)
+    # It is 0.886 to 0.899 by increments of 0.1 and 0.02 m and tolerances of 0.005 to 0.00125.
+    assert [max(path.load_multiplier) for path in paths] == pytest.approx([0.892] * 2, rel=0.012)
     # Where it ends after a jump hangs on the steps, which blockvis run tells; here it is an equilibrium.
     assert all(path.path[-1].least <= path.load_multiplier[-1] <= path.path[-1].largest for path in paths)
     assert all((np.diff(path.settlement) > 0.0).all() for path in paths)
