@@ -27,7 +27,6 @@ TIGHT = 1e-9
 #: collapse is enclosed to a tolerance, and rounding may choose among the places within it.
 LOOSER = dict.fromkeys(
     (
-        "panel_with_opening",
         "wall_horizontal_after_settlement",
         "wall_loaded",
         "wall_self_weight",
@@ -39,6 +38,9 @@ LOOSER = dict.fromkeys(
     "wall_with_arch": 6e-2,
     # Which of brittle joints breaks first may follow from rounding.
     "wall_with_mortar": 1e-2,
+    # Between kernels, at one increment: after a slip exact friction, which is what is reported, asks for a reaction
+    # 3.4e-2 larger than that of the path, whose friction still follows.
+    "panel_with_opening": 4e-2,
     # A brick slips a little earlier with one kernel: 4.7e-3 of the last reaction, within the step tolerance.
     "wall_self_weight": 1e-2,
     "panel_settlement_friction": 2e-3,
