@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
-from blockvis.layout.outlines import ends_of, ring_area, ring_width
+from blockvis.layout.outlines import ends_of, ring_width
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
@@ -29,9 +29,6 @@ SHORTENED = 0.05
 #: A face is a strip of mortar if it is narrower than this fraction of the typical stone, by area, and has stones along
 #: this share of its border: along both long sides.
 STRIP, BETWEEN = 0.25, 0.7
-
-#: Faces of more than so many times the median area may be openings.
-MAYBE_OPENING = 4.0
 
 #: From this number and share of the faces on, strips are joints drawn as pairs of lines.
 LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
@@ -136,13 +133,10 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
 
 
 def _openings_note(faces: Sequence[Face], n_lines: int, n_closed: int) -> Note:
-    """Tell of the faces between lines, some of them closed by outlines, and of the largest, which may be an opening."""
+    """Tell of the faces between lines, some of them closed by outlines."""
     said = f"{counted(len(faces), 'block is a face', 'blocks are faces')} between {counted(n_lines, 'loose line')}"
     said += f", {n_closed} of them beside outlines" if n_closed else ""
-    areas = np.abs([ring_area(face.ring) for face in faces])
-    largest, times = int(areas.argmax()), float(areas.max() / np.median(areas))
-    doubt = f"; 'face {largest}' has {times:.2g} times the median area" if times > MAYBE_OPENING else ""
-    remedy = f"an opening enclosed by lines counts as a block too: erase it or draw closed outlines{doubt}"
+    remedy = "an opening enclosed by lines counts as a block too: erase it or draw closed outlines"
     return Note(CHANGED, f"{said}; {remedy}")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from blockvis.text import by_similarity
+from blockvis.text import as_toml, by_similarity, listed, place_text
 from solver.mechanics import counted
 
 from .crossings import uncrossed
@@ -38,6 +38,15 @@ SLIVER_SHAPE = 20.0
 #: Blocks thinner or thicker than these times the root of their area, and of the median one, were drawn in another unit
 #: than they are thick.
 THINNEST, THICKEST = 0.02, 1000.0
+
+#: In a drawing an opening may be what has so many times the median area ...
+OPENING_AREA = 4.0
+
+#: ... and height, and stones to both sides and above: a lintel and a plinth are as high as a course or two.
+OPENING_HEIGHT = 2.5
+
+#: So many of what may be openings are named, to be copied.
+MOST_NAMED = 12
 
 #: A frame or background holds at least this share of all other outlines.
 BACKGROUND = 0.5
@@ -109,6 +118,7 @@ def noted(layout: Layout) -> Layout:
     walls = [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
     # Those of walls that a bond is to fill are told with these.
     labels = () if walls else sorted({*layout.groups, *layout.materials})
+    found += [] if walls else [Note(CHANGED, words) for words in (_maybe_openings(layout),) if words]
     found += [
         Note(CHANGED, f"what is called '{label}' counts as a stone; of an opening leave it out: ignore = [\"{label}\"]")
         for label in labels
@@ -128,6 +138,43 @@ def _specks(layout: Layout, median: float) -> str:
         f"block '{layout.names[i]}' is {layout.sizes[i]:.3g} m across, 1/{median / layout.sizes[i]:.3g} of the median "
         f"block{others}: it governs the steps of a path, which may be slow; leave it out (ignore) if it is debris"
     )
+
+
+def _maybe_openings(layout: Layout) -> str:
+    """Tell of outlines of a drawing that may be windows and doors; "" where there are none."""
+    times = np.round(layout.sizes**2 / np.median(layout.sizes) ** 2, 9)
+    found = sorted(_enclosed(layout, times), key=lambda i: -times[i])
+    if not found:
+        return ""
+    ring = layout.outlines[found[0]]
+    where = f"around {place_text((ring.min(axis=0) + ring.max(axis=0)) / 2.0)}"
+    said = f"'{layout.names[found[0]]}' {where} of {times[found[0]]:.2g} times the median area "
+    said += f"and {counted(len(found) - 1, 'other')} count as stones" if len(found) > 1 else "counts as a stone"
+    names = listed([as_toml(layout.names[i]) for i in found[:MOST_NAMED]], MOST_NAMED)
+    more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+    return f"{said}; leave out what is an opening: ignore = [{names}]{more}"
+
+
+def _enclosed(layout: Layout, times: np.ndarray) -> list[int]:
+    """Find outlines as large, ``times`` the median area, and as high as openings, with others beside and above."""
+    if layout.dimension == 3:
+        return []
+    low, high = (np.array([by(ring, axis=0) for ring in layout.outlines]) for by in (np.min, np.max))
+    heights = high[:, 1] - low[:, 1]
+    near = ROUNDING * float((high.max(axis=0) - low.min(axis=0)).max())
+    # Only outlines of a drawing have a look; what is known to be a support, or called an opening, is told elsewhere.
+    known = [
+        not looks or role or VOIDS.fullmatch(group)
+        for looks, role, group in zip(layout.looks, layout.roles, layout.groups, strict=True)
+    ]
+    doubted = ~np.array(known, bool) & (times > OPENING_AREA) & (heights > OPENING_HEIGHT * np.median(heights))
+    found = []
+    for i in np.flatnonzero(doubted).tolist():
+        over, beside = ((low < high[i] - near) & (high > low[i] + near)).T
+        left, right, above = high[:, 0] < low[i, 0] + near, low[:, 0] > high[i, 0] - near, low[:, 1] > high[i, 1] - near
+        if (beside & left).any() and (beside & right).any() and (over & above).any():
+            found.append(i)
+    return found
 
 
 def _thickness_doubt(layout: Layout, median: float) -> str:

@@ -74,6 +74,32 @@ def test_what_is_no_block_is_left_out_with_a_note(tmp_path, extra, note):
         assert read(tmp_path / "wall.dxf").n_blocks == 16
 
 
+def test_windows_among_stones_on_their_own_layer_are_named(tmp_path, capsys):
+    def facade(*windows):
+        document = ezdxf.new("R2010")
+        document.header["$INSUNITS"] = 4
+        space = document.modelspace()
+        cut = [brick(x, 300, 900, 900) for x in windows]
+        stones = [brick(300 * k, 300 * course, 300, 300) for course in range(6) for k in range(14)]
+        stones = [ring for ring in stones if not any((ring >= w[0]).all() and (ring <= w[2]).all() for w in cut)]
+        # Neither a plinth nor a lintel is an opening, nor a buttress with stones to one side only.
+        others = [brick(0, -300, 4200, 300), brick(0, 1800, 4200, 300), brick(-900, 0, 900, 1800)]
+        rings = [*stones, *others, *cut]
+        handles = [space.add_lwpolyline(ring.tolist(), close=True).dxf.handle for ring in rings]
+        document.saveas(tmp_path / "facade.dxf")
+        return [f"block {handle}" for handle in handles[len(stones) + len(others) :]]
+
+    first, second = facade(600, 2400)
+    assert main(["new", str(tmp_path / "facade.dxf"), "-o", str(tmp_path / "case.toml")]) == 0
+    says = f"'{first}' around (1.05, 0.75) of 9 times the median area and 1 other count as stones; leave out what is"
+    says += f' an opening: ignore = ["{first}", "{second}"]'
+    assert says in capsys.readouterr().err
+    left = read_layout(tmp_path / "facade.dxf", ignore=[first, second])
+    assert not any("an opening" in note for note in left.notes)
+    facade()
+    assert not any("an opening" in note for note in read_layout(tmp_path / "facade.dxf").notes)
+
+
 def test_lines_across_the_wall_are_left_out_and_cut_nothing(tmp_path):
     def axes(space):
         for a, b in (((-300, 100), (1300, 100)), ((-300, 200), (1300, 200)), ((120, -300), (120, 900))):
