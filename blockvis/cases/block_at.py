@@ -90,7 +90,8 @@ def block_at(
     """Find the block, among those chosen, that holds a point [m]; what is ``gone`` holds nothing.
 
     Of several that meet there it is the one into which a direction leads, as of a force, then the one whose centroid is
-    nearest. ValueError if none of them that is left holds the point; names the nearest and how far it is.
+    nearest, and a warning names it. ValueError if none of them that is left holds the point; names the nearest and how
+    far it is.
     """
     apart = distances_to(assembly, point)
     holding = chosen[apart[chosen] <= ROUNDING * assembly.block_size]
@@ -120,4 +121,11 @@ def block_at(
     )
     near = np.linalg.norm(assembly.centroids[holding] - np.asarray(point), axis=1)
     into = np.round(distances_to(assembly, ahead)[holding] / (ROUNDING * assembly.block_size))
-    return int(holding[np.lexsort((*assembly.centroids[holding].T, near, into))[0]])
+    block, *others = holding[np.lexsort((*assembly.centroids[holding].T, near, into))].tolist()
+    beside = listed([f"'{assembly.names[other]}'" for other in others])
+    warnings.warn(
+        f"{where} {place} m lies on a joint: '{assembly.names[block]}' is taken, not {beside}; for another move the "
+        "point into it, or name it",
+        stacklevel=3,
+    )
+    return int(block)

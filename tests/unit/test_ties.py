@@ -31,6 +31,7 @@ BLOCKS = """{"blocks": [
   {"name": "ground", "role": "fixed", "outline": [[-1, -0.3], [1, -0.3], [1, 0], [-1, 0]]},
   {"name": "footing", "role": "moving", "outline": [[2, -0.3], [4, -0.3], [4, 0], [2, 0]]}
 ]}"""
+BLOCK_NAMES = [block["name"] for block in json.loads(BLOCKS)["blocks"]]
 TIE = {"name": "iron", "from": [0.25, 1.5], "to": [2.75, 1.5], "stiffness": 1e7}
 
 
@@ -64,6 +65,14 @@ def test_ends_are_held_by_the_blocks_at_their_points_by_named_ones_and_by_the_gr
     assert (iron.blocks, iron.points) == ((0, 1), ((0.25, 1.5), (2.75, 1.5)))
     assert (iron.kind, iron.stiffness, iron.strength, iron.phase) == ("tie", 1e7, np.inf, 1)
     assert (stay.blocks, stay.kind, stay.prestress) == ((1, None), "bar", 10.0)
+
+
+@pytest.mark.parametrize(("to", "taken", "beside"), [([2.75, 1.5], "ground", "left"), ([0.75, -0.2], "left", "ground")])
+def test_an_end_on_a_joint_is_held_by_the_block_behind_it_and_a_note_says_which(tmp_path, to, taken, beside):
+    says = rf"iron' from \(0.25, 0\) m lies on a joint: '{taken}' is taken, not '{beside}'"
+    with pytest.warns(UserWarning, match=says):
+        (tie,) = ties_of(tmp_path, TIE | {"from": [0.25, 0.0], "to": to})
+    assert BLOCK_NAMES[tie.blocks[0]] == taken
 
 
 def test_area_and_modulus_give_the_stiffness(tmp_path):
