@@ -239,6 +239,11 @@ class Sheet:
                 used = -LEGEND_GAP * size
             rows[-1].append(key)
             used += LEGEND_GAP * size + width
+        # The first entry has company where that fits; the others stay in place as it comes and goes in a film.
+        if len(rows) > 1 and len(rows[-1]) == 1 and len(rows[-2]) > 2:
+            second = rows[-2][-1]
+            if used + LEGEND_GAP * size + _width(second, size) <= room:
+                rows[-1].insert(0, rows[-2].pop())
         return rows
 
     def _colour_bar(self, page: Image.Image, draw: ImageDraw.ImageDraw, bar: ColourBar) -> None:

@@ -199,6 +199,24 @@ def test_a_legend_has_no_gaps_and_what_stays_keeps_its_place():
     assert same - beside == pytest.approx(hinge - lost, abs=1), "as near as if nothing had been between"
 
 
+def test_the_first_entry_of_a_legend_does_not_stand_alone_and_the_others_stay_as_it_comes_and_goes():
+    colours = [(25 * k, 200, 0) for k in range(9)]
+    keys = [drawing.Key("area", "an entry of it", colour) for colour in colours]
+    sheet = Sheet((900, 506))
+    page = Image.new("RGB", sheet.inside_size, "white")
+
+    def rows(chosen):
+        drawn = np.asarray(sheet.composed(page, title="", detail="", keys=chosen, pixel=0.01))
+        return [np.argwhere((drawn == key.colour).all(axis=2))[0].tolist() for key in chosen]
+
+    # As many as one row holds, and one more.
+    n = max(k for k in range(1, 9) if len({y for y, _ in rows(keys[-k:])}) == 1)
+    assert 3 <= n < 9
+    one, more = rows(keys[-n:]), rows(keys[-n - 1 :])
+    assert more[0][0] == more[1][0] < more[2][0]
+    assert more[2:] == one[1:]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("view", [None, "top"], ids=["from above and below", "from above"])
 def test_the_legend_names_what_a_view_in_space_shows(view, words, tmp_path):
