@@ -641,6 +641,7 @@ def _new(options: argparse.Namespace) -> int:
 
     from .case_files.new_case import case_text, relative_to, unit_instead
     from .formats.read import inspect
+    from .layout.ground import ground_of
     from .layout.units import metres_per
     from .system.atomic_files import write_atomic
 
@@ -664,12 +665,12 @@ def _new(options: argparse.Namespace) -> int:
     print(f"{target} written for {counted(len(found.kept), 'block')}; run it: blockvis run {target}")
     if found.layout.dimension == 2 and found.layout.thickness is None:
         print("the drawing does not say how deep it is: 1 m, unless [geometry] thickness says more")
-    _try_new(text, target, drawing=options.outputs is None)
+    _try_new(text, target, ground_of(found).remark, drawing=options.outputs is None)
     return 0
 
 
-def _try_new(text: str, target: Path, *, drawing: bool) -> None:
-    """Say whether what a new case describes stands, and draw it with its ground."""
+def _try_new(text: str, target: Path, remark: str, *, drawing: bool) -> None:
+    """Say whether what a new case describes stands, and draw it with its ground and a remark on that."""
     from .case_files.read import parse_case
     from .cases.build import case_assembly
     from .layout.inspect import inspected
@@ -694,7 +695,7 @@ def _try_new(text: str, target: Path, *, drawing: bool) -> None:
         try:
             # Its joints are closed: what is wider now is a place between arch and wall, and no mortar.
             shown = replace(inspected(layout), joints=Facing.none())
-            drawn = draw_inspection(shown, target.with_suffix(".supports.png"), falling=found.falling)
+            drawn = draw_inspection(shown, target.with_suffix(".supports.png"), falling=found.falling, remark=remark)
             print(f"drawn with its supports in {drawn}")
         except MissingExtra as missing:
             print(f"blockvis: note: not drawn: {missing}", file=sys.stderr)
@@ -918,7 +919,7 @@ def _info(options: argparse.Namespace) -> int:
         ground = ground_of(found)
         found = replace(found, roles=tuple(roles_of(found.layout, ground.roles)))
         laid = supports_of(ground.supports, found.layout.dimension)
-        print(f"drawn in {draw_inspection(found, options.picture, ground=laid)}")
+        print(f"drawn in {draw_inspection(found, options.picture, ground=laid, remark=ground.remark)}")
     return 0
 
 

@@ -38,6 +38,9 @@ STAND_OFF = 0.05
 #: A foot narrower than this fraction of its block, in space of its plan, is a point or an edge.
 NARROW = 0.2
 
+#: Why the ground has pits.
+PITS = "pits keep it off the sides of stones that reach lower than the next"
+
 #: Slope of what is level; corners within this fraction of its height above the bottom are in a bottom face in space.
 LEVEL = 0.01
 
@@ -53,6 +56,7 @@ class Ground:
     roles: Mapping[str, str] = field(default_factory=dict)
     supports: tuple[Mapping[str, Any], ...] = ()
     settles: bool = True
+    remark: str = ""  #: What a picture of it is to say, or "".
 
 
 @dataclass(frozen=True)
@@ -160,11 +164,12 @@ def _laid(found: Inspection) -> Ground:
         side = [foot.block for foot in springers if split.moves(foot) is moves]
         roles |= dict.fromkeys(_names_of(layout, blocks, side), role)
     supports: list[Mapping[str, Any]] = []
+    dug = False
     if beds and layout.dimension == 3:
         is_level = np.ptp([foot.level for foot in beds]) < 1e-3 * depth
         supports = _slab(found, beds, split, depth) if is_level and not springers else _pads(found, beds, split)
     elif beds:
-        supports = _bedded(_drawn_and_closed(found, outlines), feet, split, depth, _opening(found))
+        supports, dug = _bedded(_drawn_and_closed(found, outlines), feet, split, depth, _opening(found))
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
     here = f"the ground below it {said if split.axis else 'stands on the left and settles on the right'}"
@@ -174,7 +179,8 @@ def _laid(found: Inspection) -> Ground:
             f"the lowest blocks, which end in a slope, an edge or a point, are supports{ground}; what is below {said}"
         )
     settles = mechanics.MOVING in [*roles.values(), *(support["role"] for support in supports)]
-    return Ground(f"The drawing has no supports: here {here}.", roles, tuple(supports), settles)
+    says = f"The drawing has no supports: here {here}.{f' In the ground {PITS}.' * dug}"
+    return Ground(says, roles, tuple(supports), settles, f"white in the ground: {PITS}" * dug)
 
 
 def _drawn_and_closed(found: Inspection, outlines: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -313,8 +319,8 @@ def _widest_free(bed: np.ndarray, taken: Iterable[tuple[float, float]]) -> np.nd
 
 def _bedded(
     outlines: Sequence[np.ndarray], feet: Sequence[_Foot], split: _Split, depth: float, opening: float
-) -> list[Mapping[str, Any]]:
-    """Lay two halves whose top follows the beds, with a step half-way between each and the next."""
+) -> tuple[list[Mapping[str, Any]], bool]:
+    """Lay two halves whose top follows the beds, with a step half-way between two; whether there are pits, too."""
     beds = sorted((foot.bed for foot in feet if foot.bed is not None), key=lambda bed: float(bed[0, 0]))
     top = [beds[0][0] - [depth, 0.0]]
     for bed, following in zip(beds, [*beds[1:], None], strict=True):
@@ -326,8 +332,8 @@ def _bedded(
     floor = min(float(ring[:, 1].min()) for ring in outlines) - depth
     (start, _), (end, _) = top[0], top[-1]
     line = shapely.simplify(shapely.LineString(top), ROUNDING * depth)
-    ground = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
-    ground = _dug(ground, outlines, [np.array(top[:1]), *beds, np.array(top[-1:])], opening, ROUNDING * depth)
+    whole = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
+    ground = _dug(whole, outlines, [np.array(top[:1]), *beds, np.array(top[-1:])], opening, ROUNDING * depth)
     halves: list[Mapping[str, Any]] = []
     for name, role, left, right in (
         ("ground left", mechanics.FIXED, start, split.at),
@@ -340,7 +346,7 @@ def _bedded(
             corners = without_collinear(corners)
             corners = np.roll(corners, -int(np.lexsort((corners[:, 0], corners[:, 1]))[0]), axis=0)
             halves.append({"name": name, "role": role, "outline": corners.tolist()})
-    return halves
+    return halves, bool(ground.area < whole.area - (ROUNDING * depth) ** 2)
 
 
 def _dug(

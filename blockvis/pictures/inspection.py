@@ -26,12 +26,17 @@ MOST_NAMED = 8
 
 
 def draw_inspection(
-    inspection: Inspection, path: str | Path, *, ground: Layout | None = None, falling: Sequence[int] = ()
+    inspection: Inspection,
+    path: str | Path,
+    *,
+    ground: Layout | None = None,
+    falling: Sequence[int] = (),
+    remark: str = "",
 ) -> Path:
     """Draw what was found: blocks with their names and roles, joints by their thickness, what was left out.
 
     The file is .png, .svg or .pdf. ``ground`` are supports beside the blocks of the drawing, with their roles,
-    ``falling`` the numbers of blocks that do not stand.
+    ``falling`` the numbers of blocks that do not stand; a ``remark`` is written above.
     """
     layout, kept = inspection.layout, inspection.kept.tolist()
     deep = [pair for pair in inspection.overlapping if pair[2] > inspection.overlap_tolerance]
@@ -54,7 +59,7 @@ def draw_inspection(
     contents = Contents(
         layout=layout,
         title=f"{_name(layout)}: {mechanics.counted(len(kept), 'block')}{in_space}, read in {layout.unit}",
-        findings=(*_findings(inspection, deep), *walls.values()),
+        findings=(*_findings(inspection, deep), *walls.values(), *((remark,) if remark and not walls else ())),
         kinds=tuple(kinds),
         named=tuple(kept),
         marked=wrong[:MOST_NAMED],

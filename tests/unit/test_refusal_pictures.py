@@ -135,6 +135,18 @@ def test_the_ground_is_drawn_below_and_blocks_that_fall_are_told_apart(tmp_path)
     assert said <= set(_comments(words_of(path)))
 
 
+@pytest.mark.parametrize("lower", [0.0, 0.1])
+def test_pits_in_the_ground_are_told_in_the_picture_and_in_the_case(tmp_path, lower):
+    """They looked like slots that nobody had asked for."""
+    drawn, case = tmp_path / "a.json", tmp_path / "a.toml"
+    save_layout(solver.Assembly.from_outlines([box(0), [[1, -lower], [2, -lower], [2, 0.5], [1, 0.5]]]), drawn)
+    assert main(["info", str(drawn), "--picture", str(tmp_path / "a.svg")]) == 0
+    assert main(["new", str(drawn), "-o", str(case)], outputs=()) == 0
+    told = " ".join(_comments(words_of(tmp_path / "a.svg"))), " ".join(case.read_text(encoding="utf-8").split("\n# "))
+    says = "pits keep it off the sides of stones that reach lower"
+    assert [says in words for words in told] == [lower > 0.0] * 2
+
+
 def test_names_are_written_where_they_can_be_read(tmp_path):
     outlines = [box(0, width=20, height=10), *(box(20 + 0.01 * k, width=0.01, height=10) for k in range(40))]
     save_layout(solver.Assembly.from_outlines(outlines), tmp_path / "a.json")
