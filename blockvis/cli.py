@@ -665,7 +665,10 @@ def _new(options: argparse.Namespace) -> int:
     print(f"{target} written for {counted(len(found.kept), 'block')}; run it: blockvis run {target}")
     if found.layout.dimension == 2 and found.layout.thickness is None:
         print("the drawing does not say how deep it is: 1 m, unless [geometry] thickness says more")
-    _try_new(text, target, ground_of(found).remark, drawing=options.outputs is None)
+    ground = ground_of(found)
+    if ground.doubt:
+        print(f"blockvis: note: {ground.doubt}", file=sys.stderr)
+    _try_new(text, target, ground.remark, drawing=options.outputs is None)
     return 0
 
 

@@ -17,6 +17,7 @@ from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
 from blockvis.layout.outlines import ends_of, ring_width
 from blockvis.layout.refusal import Refused
+from blockvis.text import as_toml, listed
 from solver.mechanics import counted
 
 from .arcs import MEETS, with_shared_corners
@@ -126,7 +127,7 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     rest = np.setdiff1d(np.arange(len(lines)), [*cutting])
     n_closed = _add_faces([lines[k] for k in rest], segments[rest], outlined, ignored, every, size, found)
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
-    found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
+    found.notes += [*_cut_notes(found, lines, cutting, openings), *mortar]
     if found.faces:
         found.notes.append(_openings_note(found.faces, len(lines), n_closed))
     return found
@@ -185,17 +186,19 @@ def _cut_outlines(
     return cutting, openings
 
 
-def _cut_notes(found: Faces, n_lines: int, openings: Set[int]) -> list[Note]:
-    """Say how many lines cut outlines, into how many blocks, and around which that may be openings."""
+def _cut_notes(found: Faces, lines: Sequence[Line], cutting: Set[int], openings: Set[int]) -> list[Note]:
+    """Say how many lines, of which layers, cut outlines, into how many blocks, and around which possible openings."""
     if not found.pieces:
         return []
     n = sum(map(len, found.pieces.values()))
     around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
-    said = f"cut: {counted(n_lines, 'line')} within {around} into {counted(n, 'block')}"
+    said = f"cut: {counted(len(cutting), 'line')} within {around} into {counted(n, 'block')}"
     if openings:
         around = counted(len(openings), "outline")
         said += f" around {around}, a block too: ignore it by its name if it is an opening"
-    return [Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints")]
+    named = listed([as_toml(layer) for layer in sorted({lines[k].layer for k in cutting} - {""})])
+    beside = f" or their layers, [{named}]" if named else ""
+    return [Note(CHANGED, f'{said}; if they are no joints, leave them out: ignore = ["line"]{beside}')]
 
 
 def _without_mortar(found: Faces, reach: float) -> list[Note]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -38,6 +39,9 @@ STAND_OFF = 0.05
 #: A foot narrower than this fraction of its block, in space of its plan, is a point or an edge.
 NARROW = 0.2
 
+#: A block over both halves of the ground that is longer than so many others bridges what settles.
+BRIDGE = 4.0
+
 #: Why the ground has pits.
 PITS = "pits keep it off the sides of stones that reach lower than the next"
 
@@ -57,6 +61,7 @@ class Ground:
     supports: tuple[Mapping[str, Any], ...] = ()
     settles: bool = True
     remark: str = ""  #: What a picture of it is to say, or "".
+    doubt: str = ""  #: Of a block that may be ground itself, or "".
 
 
 @dataclass(frozen=True)
@@ -180,7 +185,23 @@ def _laid(found: Inspection) -> Ground:
         )
     settles = mechanics.MOVING in [*roles.values(), *(support["role"] for support in supports)]
     says = f"The drawing has no supports: here {here}.{f' In the ground {PITS}.' * dug}"
-    return Ground(says, roles, tuple(supports), settles, f"white in the ground: {PITS}" * dug)
+    doubt = _bridging(found, beds, split) if supports and settles else ""
+    return Ground(says, roles, tuple(supports), settles, f"white in the ground: {PITS}" * dug, doubt)
+
+
+def _bridging(found: Inspection, beds: Sequence[_Foot], split: _Split) -> str:
+    """Tell of a block over both halves, far longer than others, as ground that is drawn; "" where there is none."""
+    layout = found.layout
+    for foot in beds:
+        low, high = (float(end[split.axis]) for end in (foot.low, foot.high))
+        if low < split.at < high and high - low > BRIDGE * block_size(found):
+            name, group = layout.names[foot.block], layout.groups[foot.block]
+            alone = group and [layout.groups[i] for i in found.kept].count(group) == 1
+            length = f"{high - low:.3g} m long"
+            said = f"'{name}' is one stone, {length}, over both halves of the ground, and bridges what settles below"
+            ignored = shlex.quote(group if alone else name)
+            return f"{said}: if it is ground, leave it out, --ignore {ignored}; else draw its stones"
+    return ""
 
 
 def _drawn_and_closed(found: Inspection, outlines: Sequence[np.ndarray]) -> list[np.ndarray]:

@@ -40,7 +40,7 @@ SLIVER_SHAPE = 20.0
 THINNEST, THICKEST = 0.02, 1000.0
 
 #: In a drawing an opening may be what has so many times the median area ...
-OPENING_AREA = 4.0
+OPENING_AREA = 2.5
 
 #: ... and height, and stones to both sides and above: a lintel and a plinth are as high as a course or two.
 OPENING_HEIGHT = 2.5
@@ -64,8 +64,12 @@ ANNOTATIONS = re.compile(
     re.IGNORECASE,
 )
 
-#: Labels of what is no stone, but a place without any.
-VOIDS = re.compile(r"(openings?|windows?|doors?|voids?|holes?)", re.IGNORECASE)
+#: Labels of what is no stone, but a place without any; architects' layers begin with a letter of their own, A-GLAZ.
+VOIDS = re.compile(
+    r"([a-z]-)?(openings?|win|windows?|glaz|glazing|doors?|voids?|holes?|fenster|t(ü|ue)r(en)?|öffnung(en)?|fen[eê]tres?"
+    r"|portes?|finestr[ae]|port[ae]|ventanas?|puertas?)",
+    re.IGNORECASE,
+)
 
 #: Names of mortar.
 MORTAR = re.compile(r"\b(mortar|mörtel|moertel|malta|mortier|mortero|argamassa)\b", re.IGNORECASE)

@@ -225,7 +225,7 @@ def test_joints_that_end_on_an_ignored_opening_cut_what_is_around_it(tmp_path):
     strokes = "".join(f'<path d="M{x} {y}L{u} {v}"/>' for (x, y), (u, v) in WINDOW)
     for drawing in (read_layout(path, ignore=["open"]), read_layout(svg(tmp_path, shapes + strokes), ignore=["open"])):
         assert [shapely.Polygon(ring).area for ring in drawing.outlines] == pytest.approx([0.14] * 4)
-        assert "4 blocks; leave" in next(note for note in drawing.notes if note.startswith("cut:"))
+        assert "4 blocks; if they are no joints" in next(note for note in drawing.notes if note.startswith("cut:"))
 
 
 def test_ignored_outlines_that_joints_cross_are_as_if_they_were_not_there(tmp_path):

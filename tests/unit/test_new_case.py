@@ -46,6 +46,33 @@ def test_white_stones_on_a_black_page_are_stones_and_no_openings_of_a_wall(tmp_p
     assert ("bond" not in values) == stones
 
 
+@pytest.mark.parametrize("ground", ["HATCH", "stones", ""])
+def test_ground_that_is_drawn_as_one_stone_below_all_is_told(tmp_path, capsys, ground):
+    """A façade on it did not notice that half of it settled."""
+    drawing = ezdxf.new("R2010")
+    drawing.header["$INSUNITS"] = 4
+    boxes = [(300 * k, 200 * course, 300, 200) for course in range(3) for k in range(10)]
+    layers = [*["stones"] * len(boxes), *[ground] * bool(ground)]
+    boxes += [(-200, -150, 3400, 150)] * bool(ground)
+    for (x, y, width, height), layer in zip(boxes, layers, strict=True):
+        corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)]
+        drawn = drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": layer})
+    drawing.saveas(tmp_path / "wall.dxf")
+    name = f"block {drawn.dxf.handle}"
+    _written(tmp_path / "wall.dxf")
+    (told,) = [line for line in capsys.readouterr().err.splitlines() if "one stone" in line] or [""]
+    pattern = {"HATCH": "HATCH", "stones": f"'{name}'"}.get(ground)
+    says = f"'{name}' is one stone, 3.4 m long, over both halves of the ground, and bridges what settles below"
+    assert told == (
+        f"blockvis: note: {says}: if it is ground, leave it out, --ignore {pattern}; else draw its stones"
+        if ground
+        else ""
+    )
+    if ground:
+        _written(tmp_path / "wall.dxf", "--force", "--ignore", pattern.strip("'"))
+        assert "one stone" not in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_a_dxf_with_mortar_and_no_supports_gets_a_ground_of_two_halves(tmp_path, capsys):
     """Three courses of running bond in mm with joints of 10 mm."""

@@ -100,6 +100,23 @@ def test_windows_among_stones_on_their_own_layer_are_named(tmp_path, capsys):
     assert not any("an opening" in note for note in read_layout(tmp_path / "facade.dxf").notes)
 
 
+def test_glazing_bars_that_cut_a_window_are_told_with_their_layer_and_that_this_is_no_stone(tmp_path):
+    def window(space):
+        ring = [[250, 300], [490, 300], [490, 540], [250, 540]]
+        space.add_lwpolyline(ring, close=True, dxfattribs={"layer": "A-GLAZ"})
+        space.add_line((370, 300), (370, 540), dxfattribs={"layer": "A-GLAZ"})
+
+    notes = read_layout(drawn(tmp_path, window)).notes
+    assert any(
+        note.endswith('if they are no joints, leave them out: ignore = ["line"] or their layers, ["A-GLAZ"]')
+        for note in notes
+    )
+    assert any(
+        note.startswith("what is called 'A-GLAZ' counts as a stone; of an opening leave it out") for note in notes
+    )
+    assert read_layout(tmp_path / "wall.dxf", ignore=["A-GLAZ"]).n_blocks == 16
+
+
 def test_lines_across_the_wall_are_left_out_and_cut_nothing(tmp_path):
     def axes(space):
         for a, b in (((-300, 100), (1300, 100)), ((-300, 200), (1300, 200)), ((120, -300), (120, 900))):
