@@ -134,18 +134,9 @@ def model_of(
     force = mean_load(assembly, loads)
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
-    return Model(
-        assembly,
-        interfaces,
-        loads,
-        assembly.block_size,
-        force,
-        np.zeros(assembly.n_blocks, dtype=bool),
-        has_live=has_live,
-        ties=ties,
-        compliance=controls.compliance_factor,
-        imperfection=controls.imperfection_factor,
-    )
+    units, none = (assembly.block_size, force), np.zeros(assembly.n_blocks, dtype=bool)
+    factors = {"compliance": controls.compliance_factor, "imperfection": controls.imperfection_factor}
+    return Model(assembly, interfaces, loads, *units, none, has_live=has_live, ties=ties, **factors)
 
 
 def check_settlement(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import count
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import qr
@@ -17,9 +16,6 @@ from .contacts import frames_of
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike, linked
 from .solids import ROUNDING, Faces, Solids, cross, dot, taken, unit
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 #: An edge is re-entrant where the outward normals of its faces turn against each other by more than this sine.
 REENTRANT = 1e-4
@@ -234,11 +230,15 @@ class _Piece:
 
     def separated(self, normal: np.ndarray, origin: np.ndarray) -> list[_Piece]:
         """Cut along a plane, and tell apart the bodies in which that leaves the piece."""
+        # Loaded where it is used: most blocks are convex.
+        from manifold3d import Manifold, Mesh64
+
         # Corners in the plane are so to the last digit; cuts run beside it, or faces there would stay with both sides.
         frame = frames_of(normal[None])[0]
         level = (self.points - origin) @ frame.T
         level[np.abs(level[:, 0]) <= ON_PLANE, 0] = 0.0
-        body, found, cut = _body(level, self.triangles), [], int(self.face.max()) + 1
+        numbers, found, cut = np.arange(len(self.triangles), dtype=np.uint64), [], int(self.face.max()) + 1
+        body = Manifold(Mesh64(level, self.triangles.astype(np.uint64), face_id=numbers))
         sides = (body.trim_by_plane((sense, 0.0, 0.0), BESIDE_PLANE) for sense in (1.0, -1.0))
         for part in (part for side in sides for part in side.decompose()):
             if part.volume() > SMALLEST_PART:
@@ -249,13 +249,6 @@ class _Piece:
                 points, triangles = mesh.vert_properties @ frame + origin, mesh.tri_verts.astype(np.int64)
                 found.append(_Piece(points, triangles, face))
         return found
-
-
-def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
-    # Loaded where it is used: most blocks are convex.
-    from manifold3d import Manifold, Mesh64
-
-    return Manifold(Mesh64(points, triangles.astype(np.uint64), face_id=np.arange(len(triangles), dtype=np.uint64)))
 
 
 @lru_cache(maxsize=MOST_KEPT)
@@ -276,7 +269,10 @@ def _parts_of(
         if cut is not None:
             queue += piece.separated(*cut)
         else:
-            corners, rings, volume = _hull(_drawn_corners(piece.corners, drawn.vertices), flatness)
+            # Corners of the block as they were drawn, and of several at one place the first.
+            known = np.vstack([drawn.vertices, piece.corners])
+            same = np.abs(piece.corners[:, None] - known).max(axis=2) <= 2.0 * ON_PLANE
+            corners, rings, volume = _hull(known[same.argmax(axis=1)], flatness)
             total += volume
             drawn_in = [_drawn_face(corners[ring], whole, number, edges, flatness) for ring in rings]
             drawn_in = [(k if k >= 0 else -next(inside), pieces) for k, pieces in drawn_in]
@@ -400,12 +396,6 @@ def _hull(points: np.ndarray, flatness: float) -> tuple[np.ndarray, list[list[in
         mesh = body.to_mesh64()
         triangles = mesh.tri_verts.astype(np.int64)
         return *merged_faces((mesh.vert_properties, triangles.tolist()), flatness), body.volume()
-
-
-def _drawn_corners(corners: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """(n, 3) array: corners of a part, those of the block as they were drawn, and of several at one place the first."""
-    known = np.vstack([drawn, corners])
-    return known[(np.abs(corners[:, None] - known).max(axis=2) <= 2.0 * ON_PLANE).argmax(axis=1)]
 
 
 def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray, np.ndarray] | None:
