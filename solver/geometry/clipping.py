@@ -10,7 +10,7 @@ from solver.tolerances import CORNER_TOLERANCE
 
 from .convex_parts import ENDS, PlacedParts
 from .facing import SMALLEST_SINE
-from .outlines import next_vertices
+from .outlines import next_vertices, turn
 from .portions import alike
 from .solids import cross, dot, stacked, taken, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
@@ -79,8 +79,7 @@ def _clipped(
     vertex_b = _on_face(placed, end, alone_b, b, b_in_a, corner_b, face_a, edge_a)
     pair, p, q = np.nonzero(crosses)
     u, v = on_a[pair, p, q], on_b[pair, p, q]
-    turn = along_a[pair, p, 0] * along_b[pair, q, 1] - along_a[pair, p, 1] * along_b[pair, q, 0]
-    sine = np.abs(turn) / (long_a[pair, p] * long_b[pair, q])
+    sine = np.abs(turn(along_a[pair, p], along_b[pair, q])) / (long_a[pair, p] * long_b[pair, q])
     # The edge of a runs the other way round in its face: fractions count from the corner it starts at there.
     places = places_of(1.0 - u, v, sine < SMALLEST_SINE)
     crossings = a[pair, p] + u[:, None] * along_a[pair, p]
@@ -116,9 +115,7 @@ def _crossings(
 
 def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """(n, n_points, n_edges) array [m]: how far points are to the left of edges that start at corners."""
-    offset_to = points[:, :, None] - corners[:, None]
-    direction = directions[:, None]
-    return direction[..., 0] * offset_to[..., 1] - direction[..., 1] * offset_to[..., 0]
+    return turn(directions[:, None], points[:, :, None] - corners[:, None])
 
 
 def _on_face(
@@ -158,9 +155,7 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     order = np.lexsort((np.arctan2(arms[:, 1], arms[:, 0]), owner))
     present = number > 0
     following = next_vertices(np.append(0, np.cumsum(number[present])))
-    ring = arms[order]
-    after = ring[following]
-    triangle = (ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]) / 2.0
+    triangle = turn(arms[order], arms[order[following]]) / 2.0
     # Half of the triangle before and half of the one behind.
     shares = sum(np.bincount(corner, triangle / 2.0, len(owner)) for corner in (order, order[following]))
     area = np.bincount(owner, shares, minlength=count)

@@ -13,6 +13,11 @@ from .broad_phase import box_pairs, boxes, expand_ranges
 from .portions import alike
 
 
+def turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(...) array: cross products of vectors in the plane, (..., 2), positive where b points to the left of a."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def next_vertices(offsets: np.ndarray) -> np.ndarray:
     """(n_vertices,) int array: the vertex that follows each around its polygon; edge i runs from i to it."""
     following = np.arange(1, offsets[-1] + 1)
@@ -47,9 +52,8 @@ def polygon_integrals(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.nda
     # From the first corner of each, so that coordinates far from the origin (UTM) lose no digits.
     origin = vertices[starts]
     x = vertices - np.repeat(origin, np.diff(offsets), axis=0)
-    following = next_vertices(offsets)
-    y = x[following]
-    cross = x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]
+    y = x[next_vertices(offsets)]
+    cross = turn(x, y)
     areas = np.add.reduceat(cross, starts) / 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
         local = np.add.reduceat((x + y) * cross[:, None], starts) / (6.0 * areas[:, None])
@@ -79,8 +83,7 @@ def self_crossings(vertices: np.ndarray, offsets: np.ndarray) -> dict[int, tuple
 
 
 def _side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
-    u, v = q - p, r - p
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    return turn(q - p, r - p)
 
 
 def overlap_depths(

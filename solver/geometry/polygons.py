@@ -11,7 +11,7 @@ from solver.words import kept
 
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import STEEPEST_LANDING, Contacts, are_known
-from .outlines import Bodies, next_vertices, overlap_depths, polygon_integrals
+from .outlines import Bodies, next_vertices, overlap_depths, polygon_integrals, turn
 from .solids import dot, stacked, taken
 
 #: Sine of the angle by which the flanks of a corner may tilt into the edge it faces, as those of an open joint.
@@ -73,9 +73,8 @@ class Polygons(Bodies):
     @kept
     def convex_vertex(self) -> np.ndarray:
         """(n_vertices,) bool array: false at re-entrant corners and, to rounding, straight ones: no contact points."""
-        along = (self.vertices[self.next_vertex] - self.vertices) / self.edge_lengths[:, None]
-        before = along[self.previous_vertex]
-        return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
+        along = PlacedPolygons(self, self.vertices).directions
+        return turn(along[self.previous_vertex], along) > GEOMETRY_TOLERANCE
 
     @kept
     def side_of_edge(self) -> np.ndarray:
@@ -86,8 +85,7 @@ class Polygons(Bodies):
         first, last = self.offsets[:-1], self.offsets[1:] - 1
         along = PlacedPolygons(self, self.vertices).directions
         before = along[self.previous_vertex]
-        turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
-        ends = self.convex_vertex | (turn < -LARGEST_TILT) | (dot(before, along) < 0.0)
+        ends = self.convex_vertex | (turn(before, along) < -LARGEST_TILT) | (dot(before, along) < 0.0)
         number = np.arange(len(ends))
         side = np.maximum.accumulate(np.where(ends, number, first[self.block_of_vertex]))
         # The side at the first corner may begin before it.
@@ -103,10 +101,9 @@ class Polygons(Bodies):
     def gyration(self) -> np.ndarray:
         """(n_blocks,) array [m²]: square of the radius of gyration of each block about its centroid, as drawn."""
         corner = self.vertices - self.centroids[self.block_of_vertex]
-        following = corner[self.next_vertex]
-        cross = corner[:, 0] * following[:, 1] - following[:, 0] * corner[:, 1]
+        following, first = corner[self.next_vertex], self.offsets[:-1]
+        cross = turn(corner, following)
         squares = (corner**2).sum(axis=1) + (corner * following).sum(axis=1) + (following**2).sum(axis=1)
-        first = self.offsets[:-1]
         return np.asarray(np.add.reduceat(cross * squares, first) / (6.0 * np.add.reduceat(cross, first)))
 
     def size(self, chosen: np.ndarray) -> float:
@@ -249,8 +246,8 @@ class PlacedPolygons:
         for neighbour, shared in ((following[edge[k]], following[edge[k]]), (previous[edge[k]], edge[k])):
             tangent, (_, distance) = self.directions[neighbour], self.seen_from_edges(vertex[k], neighbour)
             # The block of a corner that came through the neighbouring face lies on that face's side.
-            from_neighbour_side = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
-            through[k] &= ~(shapes.convex_vertex[shared] & from_neighbour_side & (distance > gap[k] + end[k]))
+            from_neighbour_side = shapes.convex_vertex[shared] & (turn(inward, tangent) > 0.0)
+            through[k] &= ~(from_neighbour_side & (distance > gap[k] + end[k]))
         k = k[through[k]]
         # Nor one beyond another face of the block, as of a lip that it touches from below.
         b = shapes.block_of_vertex[edge[k]]
@@ -271,7 +268,7 @@ class PlacedPolygons:
     def seen_from_edges(self, vertex: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far corners are along and before edges, (n,) arrays [m]."""
         tangent, offset = taken(self.directions, edge), taken(self.vertices, vertex) - taken(self.vertices, edge)
-        return dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
+        return dot(offset, tangent), turn(offset, tangent)
 
     def _flanks(self, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Give the unit vectors from corners to the next and to the previous corner, (n, 2) arrays."""

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from solver.assembly import Assembly
 from solver.geometry.contacts import Contacts
-from solver.geometry.outlines import polygon_integrals
+from solver.geometry.outlines import polygon_integrals, turn
 from solver.geometry.portions import alike, linked
 
 #: Laws of torsion of the faces between blocks in space.
@@ -130,7 +130,7 @@ def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
     size = np.linalg.norm(edge, axis=2)
     along = edge / np.where(size > 0.0, size, 1.0)[..., None]
     # Of the triangle from the centre to an edge at a height h: ∫ |x| dA = h / 6 (t √(t² + h²) + h² asinh (t / h)).
-    height = start[..., 0] * along[..., 1] - start[..., 1] * along[..., 0]
+    height = turn(start, along)
     mean = np.zeros(len(points))
     for corner, sign in ((end, 1.0), (start, -1.0)):
         t = (corner * along).sum(axis=2)
