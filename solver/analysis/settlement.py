@@ -67,7 +67,7 @@ def settlement_increments(
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
     if by_program:
-        steps = linear_program_increments(near, local, interfaces, loads, resume)
+        steps = linear_program_increments(model_of(near, loads, interfaces, controls), local, resume)
     else:
         steps = _increments(near, local, interfaces, loads, controls, resume, near_ties, changes, on_step)
     return Increments(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
