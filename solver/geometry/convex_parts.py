@@ -325,9 +325,8 @@ def _crossing(piece: _Piece) -> np.ndarray | None:
         k = np.flatnonzero((before * after < 0.0) & (np.minimum(np.abs(before), np.abs(after)) > ON_CORNER))
         k = k[~np.isin(edges[k], own).any(axis=1)]
         at = start[k] + (before[k] / (before[k] - after[k]))[:, None] * (end[k] - start[k])
-        inside = np.all(
-            [cross((q - p)[None], at - p) @ normal > -ON_CORNER for p, q in ((a, b), (b, c), (c, a))], axis=0
-        )
+        around = ((a, b), (b, c), (c, a))
+        inside = np.all([cross((q - p)[None], at - p) @ normal > -ON_CORNER for p, q in around], axis=0)
         if inside.any():
             return np.asarray(at[inside][0])
     return None
