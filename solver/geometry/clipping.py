@@ -11,7 +11,7 @@ from solver.tolerances import CORNER_TOLERANCE
 from .convex_parts import ENDS, PlacedParts
 from .facing import SMALLEST_SINE
 from .outlines import next_vertices, turn
-from .portions import alike
+from .portions import alike, at_largest
 from .solids import cross, dot, stacked, taken, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
 
@@ -125,10 +125,8 @@ def _on_face(
     candidates = np.stack([own, solids.previous_corner[own]], axis=1)
     crossing = cross(unit(placed.along(candidates)), along[:, None])
     sine = np.sqrt(dot(crossing, crossing))
-    steepest = sine.argmax(axis=1)
-    row = np.arange(len(own))
-    crossed, at = candidates[row, steepest], placed.starts(own)
-    on_boundary = (depths.min(axis=1) <= end[pair, 0]) & (sine[row, steepest] >= SMALLEST_SINE)
+    (steepest, crossed), at = at_largest(sine, candidates), placed.starts(own)
+    on_boundary = (depths.min(axis=1) <= end[pair, 0]) & (steepest >= SMALLEST_SINE)
     on_boundary &= (placed.kinds_at(other, at) == ENDS) & (placed.kinds_at(crossed, at) == ENDS)
     code = np.where(on_boundary, other * np.int64(len(solids.corners)) + crossed, -1)
     return pair, feature_rows(ON_FACE, solids.corners[own], face[pair], code), a.points[pair, p]

@@ -10,7 +10,7 @@ import numpy as np
 
 from .broad_phase import box_pairs, expand_ranges
 from .convex_parts import PlacedParts
-from .portions import alike
+from .portions import alike, at_largest
 from .solids import ROUNDING, cross, dot, taken, unit
 
 #: Edges nearer to parallel than this sine have no common normal: they are clipped against each other.
@@ -75,10 +75,7 @@ def face_separations(placed: PlacedParts, i: np.ndarray, j: np.ndarray) -> tuple
     for k, face, vertex in alike((solids.faces_of_block, i), (solids.offsets, j), filled=True):
         distance = placed.before_faces(face, vertex)
         behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
-        distance = np.where(inner[face], -np.inf, distance)
-        farthest = distance.argmax(axis=1)
-        row = np.arange(len(k))
-        apart[k], leading[k] = distance[row, farthest], face[row, farthest]
+        apart[k], leading[k] = at_largest(np.where(inner[face], -np.inf, distance), face)
     return apart, behind, leading
 
 
@@ -108,10 +105,8 @@ def edge_separations(
                 inward = sense * cross(taken(normals, solids.face_of_corner[of_face]), along)
                 separates &= side * dot(np.expand_dims(inward, axis), normal) >= -ROUNDING
         distance = np.where(separates, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
-        farthest = distance.argmax(axis=1)
-        row = np.arange(len(k))
-        apart[k] = distance[row, farthest]
-        edge_i[k], edge_j[k] = own[row, farthest // other.shape[1]], other[row, farthest % other.shape[1]]
+        pairs = np.repeat(own, other.shape[1], axis=1), np.tile(other, (1, own.shape[1]))
+        apart[k], edge_i[k], edge_j[k] = at_largest(distance, *pairs)
     return apart, edge_i, edge_j
 
 
@@ -149,8 +144,8 @@ def _opposed_faces(placed: PlacedParts, leading: np.ndarray, j: np.ndarray) -> n
     normals = placed.faces.normals
     opposed = np.empty(len(j), dtype=np.int64)
     for k, face in alike((placed.solids.faces_of_block, j), filled=True):
-        cosine = dot(normals[face], normals[leading[k]][:, None])
-        opposed[k] = face[np.arange(len(k)), np.where(placed.parts.inner[face], np.inf, cosine).argmin(axis=1)]
+        against = -dot(normals[face], normals[leading[k]][:, None])
+        _, opposed[k] = at_largest(np.where(placed.parts.inner[face], -np.inf, against), face)
     return opposed
 
 
