@@ -99,8 +99,8 @@ def overlap_depths(
     of their ends from the other edge).
     """
     i, j = box_pairs(vertices, offsets, -tolerance)
-    depth = np.maximum(_inside_depth(vertices, offsets, i, j), _inside_depth(vertices, offsets, j, i))
-    depth = np.maximum(depth, _crossing_depth(vertices, offsets, i, j))
+    of_points = _inside_depth(vertices, offsets, np.append(i, j), np.append(j, i)).reshape(2, -1)
+    depth = np.maximum(of_points.max(axis=0), _crossing_depth(vertices, offsets, i, j))
     deep = depth > tolerance
     return i[deep], j[deep], depth[deep]
 
@@ -147,18 +147,15 @@ def _signed_distance(points: np.ndarray, block: np.ndarray, vertices: np.ndarray
 
 def _inside_depth(vertices: np.ndarray, offsets: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     """For each pair, how deep the deepest corner, edge middle or interior point of i lies inside j."""
-    following = next_vertices(offsets)
-    middles = (vertices + vertices[following]) / 2.0
-    inner = interior_points(vertices, offsets)
+    middles, inner = (vertices + vertices[next_vertices(offsets)]) / 2.0, interior_points(vertices, offsets)
     low, high = boxes(vertices, offsets)
     depth = np.zeros(len(i))
-    counts = np.diff(offsets)[i]
-    owner, position = expand_ranges(counts)
+    owner, position = expand_ranges(np.diff(offsets)[i])
     index = offsets[i][owner] + position
-    sets = ((vertices[index], owner), (middles[index], owner), (inner[i], np.arange(len(i))))
-    for points, pair in sets:
-        near = ((points >= low[j[pair]]) & (points <= high[j[pair]])).all(axis=1)
-        np.maximum.at(depth, pair[near], _signed_distance(points[near], j[pair[near]], vertices, offsets))
+    points = np.concatenate([vertices[index], middles[index], inner[i]])
+    pair = np.concatenate([owner, owner, np.arange(len(i))])
+    near = ((points >= low[j[pair]]) & (points <= high[j[pair]])).all(axis=1)
+    np.maximum.at(depth, pair[near], _signed_distance(points[near], j[pair[near]], vertices, offsets))
     return depth
 
 
