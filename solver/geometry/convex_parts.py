@@ -60,6 +60,7 @@ class ConvexParts(Kept):
 
     solids: Solids  #: the parts
     block_of_part: np.ndarray  #: (n_parts,) int, ascending
+    widths: np.ndarray  #: (n_blocks,) [m]
     source: np.ndarray  #: (n_corners, 4) int: four corners of the block from which each corner of the parts follows
     weights: np.ndarray  #: (n_corners, 4): with these weights
     inner: np.ndarray  #: (n_faces,) bool: faces of the parts inside their block, where it was cut
@@ -149,7 +150,7 @@ def convex_parts(solids: Solids) -> ConvexParts:
     if not bent.any():
         none, n_faces, ends = np.zeros((0, 4)), len(solids.block_of_face), np.array([0.0, 1.0, ENDS])
         of_faces = np.zeros(n_faces, dtype=bool), np.arange(n_faces), np.tile(ends, (len(solids.corners), 1, 1))
-        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, *of_faces)
+        return ConvexParts(solids, np.arange(len(solids)), solids.widths, none.astype(np.int64), none, *of_faces)
     surfaces, sources, weights, block_of_part, drawn_faces = [], [], [], [], []
     pieces: list[np.ndarray] = []
     for block in range(len(solids)):
@@ -175,6 +176,7 @@ def convex_parts(solids: Solids) -> ConvexParts:
     return ConvexParts(
         Solids.of_surfaces(surfaces),
         np.array(block_of_part),
+        solids.widths,
         np.concatenate(sources),
         np.concatenate(weights),
         drawn_face[:, 1] < 0,

@@ -110,26 +110,22 @@ def edge_separations(
     return apart, edge_i, edge_j
 
 
-def near_parts(
-    placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def near_parts(placed: PlacedParts, reach: float, useful: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of parts of two blocks, one useful, the lower first, whose boxes are within reach; the thinner's width."""
-    block_of_part = placed.parts.block_of_part
+    block_of_part, widths = placed.parts.block_of_part, placed.parts.widths
     i, j = box_pairs(placed.vertices, placed.solids.offsets, reach)
     a, b = block_of_part[i], block_of_part[j]
     chosen = (a != b) & (useful[a] | useful[b])
     return i[chosen], j[chosen], np.minimum(widths[a], widths[b])[chosen]
 
 
-def overlapping_parts(
-    placed: PlacedParts, tolerance: float, useful: np.ndarray, widths: np.ndarray
-) -> tuple[np.ndarray, ...]:
+def overlapping_parts(placed: PlacedParts, tolerance: float, useful: np.ndarray) -> tuple[np.ndarray, ...]:
     """Near parts, as of :func:`near_parts`, that overlap by more than a tolerance [m], and their depths, (n,) [m].
 
     Convex parts are separated by a face of one of them or by two edges across each other: the largest separation of
     these, negative, is the depth.
     """
-    i, j, width = near_parts(placed, -tolerance, useful, widths)
+    i, j, width = near_parts(placed, -tolerance, useful)
     apart = np.full(len(i), -np.inf)
     by_edges = partial(edge_separations, smallest_sine=ROUNDING)
     for of, kinds in ((face_separations, 2), (face_separations, 2), (by_edges, 1)):
@@ -149,12 +145,12 @@ def _opposed_faces(placed: PlacedParts, leading: np.ndarray, j: np.ndarray) -> n
     return opposed
 
 
-def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray) -> FacingParts:
+def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray) -> FacingParts:
     """Choose the faces of near parts that face each other, where no face separates them farther than ``reach`` [m].
 
-    One of two near parts must be of the useful blocks, (n_blocks,) bool array, which have widths (n_blocks,) [m].
+    One of two near parts must be of the useful blocks, (n_blocks,) bool array.
     """
-    i, j, width = near_parts(placed, reach, useful, widths)
+    i, j, width = near_parts(placed, reach, useful)
     of_i = list(face_separations(placed, i, j))
     near = np.flatnonzero(np.maximum(*of_i[:2]) <= reach)
     i, j, width, *of_i = (value[near] for value in (i, j, width, *of_i))
