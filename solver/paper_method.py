@@ -332,7 +332,6 @@ def linear_program_increments(
 ) -> Generator[Increment, None, Ending]:
     """Yield the increments of settlements in the plane by the paper's linear programs; return how they ended."""
     first, pose = (0, Pose.initial(model.assembly)) if resume is None else (resume.phase, resume.start)
-    ending = Ending(Status.LIMIT_REACHED)
     for number, phase in enumerate(phases[first:], start=first):
         path, reported = _Phase(model, phase, number, pose), resume is not None
         step, upper_bound = phase.increment, np.inf

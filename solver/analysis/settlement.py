@@ -101,7 +101,6 @@ def _increments(
 ) -> Generator[Increment, None, Ending]:
     first, assembly = 0 if resume is None else resume.phase, models[0].assembly
     before: PathState | None = None
-    ending = Ending(Status.LIMIT_REACHED, "the settlement has reached its limit")
     for number, phase in enumerate(phases[first:], start=first):
         start = Pose.initial(assembly) if before is None else before.history[0].pose
         start = start if resume is None else resume.start

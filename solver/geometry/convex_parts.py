@@ -62,7 +62,7 @@ class ConvexParts(Kept):
     block_of_part: np.ndarray  #: (n_parts,) int, ascending
     widths: np.ndarray  #: (n_blocks,) [m]
     source: np.ndarray  #: (n_corners, 4) int: four corners of the block from which each corner of the parts follows
-    weights: np.ndarray  #: (n_corners, 4): with these weights
+    weights: np.ndarray  #: (n_corners, 3): with these parts of the ways from the first to the others
     inner: np.ndarray  #: (n_faces,) bool: faces of the parts inside their block, where it was cut
     plane: np.ndarray  #: (n_faces,) int: the same for faces into which one face of a block was cut
     pieces: np.ndarray  #: (n_corners, n_pieces, 3): of each edge from corner to corner of the block: first, last, kind
@@ -82,9 +82,9 @@ class ConvexParts(Kept):
         """Put the parts where the corners of their blocks now are, (n_vertices, 3) [m]."""
         if self.whole:
             return PlacedParts(self, vertices)
-        first = vertices[self.source[:, 0]]
-        others = (vertices[self.source[:, k]] - first for k in (1, 2, 3))
-        return PlacedParts(self, first + sum(self.weights[:, k + 1, None] * arm for k, arm in enumerate(others)))
+        first, *others = (vertices[corner] for corner in self.source.T)
+        ways = (weight[:, None] * (other - first) for weight, other in zip(self.weights.T, others, strict=True))
+        return PlacedParts(self, first + sum(ways))
 
 
 @dataclass(frozen=True)
@@ -148,10 +148,10 @@ def convex_parts(solids: Solids) -> ConvexParts:
     """
     bent = _out_of_faces(solids) > DRAWN_GAP * solids.widths
     if not bent.any():
-        none, n_faces, ends = np.zeros((0, 4)), len(solids.block_of_face), np.array([0.0, 1.0, ENDS])
+        none, n_faces, ends = np.zeros((0, 4), dtype=np.int64), len(solids.block_of_face), np.array([0.0, 1.0, ENDS])
         of_faces = np.zeros(n_faces, dtype=bool), np.arange(n_faces), np.tile(ends, (len(solids.corners), 1, 1))
-        return ConvexParts(solids, np.arange(len(solids)), solids.widths, none.astype(np.int64), none, *of_faces)
-    surfaces, sources, weights, block_of_part, drawn_faces = [], [], [], [], []
+        return ConvexParts(solids, np.arange(len(solids)), solids.widths, none, np.zeros((0, 3)), *of_faces)
+    found, drawn_faces = [], []
     pieces: list[np.ndarray] = []
     for block in range(len(solids)):
         own, loops = solids.surface(block)
@@ -167,11 +167,10 @@ def convex_parts(solids: Solids) -> ConvexParts:
         for corners, around, faces in parts:
             drawn_faces += [(block, number) for number, _ in faces]
             pieces += [of_edges for _, of_edges in faces]
-            surfaces.append((corners, around))
-            block_of_part.append(block)
             arms = np.linalg.solve((own[frame[1:]] - own[frame[0]]).T, (corners - own[frame[0]]).T).T
-            sources.append(np.tile(int(solids.offsets[block]) + frame, (len(corners), 1)))
-            weights.append(np.column_stack([1.0 - arms.sum(axis=1), arms]))
+            source = np.tile(int(solids.offsets[block]) + frame, (len(corners), 1))
+            found.append((block, (corners, around), source, arms))
+    block_of_part, surfaces, sources, weights = zip(*found, strict=True)
     drawn_face, n = np.array(drawn_faces), max(k.shape[1] for k in pieces)
     return ConvexParts(
         Solids.of_surfaces(surfaces),

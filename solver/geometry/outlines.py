@@ -112,8 +112,7 @@ def interior_points(vertices: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     inside = _signed_distance(centroids, n, vertices, offsets) > 0
     if inside.all():
         return centroids
-    following = next_vertices(offsets)
-    along = vertices[following] - vertices
+    along = vertices[next_vertices(offsets)] - vertices
     length = np.hypot(*along.T)
     owner = np.repeat(n, np.diff(offsets))
     # A fifth of the mean width inwards from the middle of the edge from which that leads deepest inside.
