@@ -76,10 +76,8 @@ class Structure(Shown):
                 f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name"
             )
         interfaces.check(checked(assembly, Assembly, "assembly"))
-        object.__setattr__(self, "assembly", assembly)
-        object.__setattr__(self, "interfaces", interfaces)
-        object.__setattr__(self, "loads", checked_loads(assembly, loads))
-        object.__setattr__(self, "ties", tuple(checked(tie, Tie, "one of the ties") for tie in ties))
+        loads, ties = checked_loads(assembly, loads), tuple(checked(tie, Tie, "one of the ties") for tie in ties)
+        vars(self).update(assembly=assembly, interfaces=interfaces, loads=loads, ties=ties)
 
     def __repr__(self) -> str:
         """Say how many blocks it has."""
