@@ -144,8 +144,8 @@ class Polygons(Bodies):
         """
         i, j, _ = overlap_depths(after, self.offsets, tolerance)
         chosen = useful[i] | useful[j]
-        placed, placed_after = PlacedPolygons(self, before), PlacedPolygons(self, after)
-        vertex, edge = _passed_edges(placed, placed_after, i[chosen], j[chosen])
+        placed = PlacedPolygons(self, before)
+        vertex, edge = placed.passed_edges(PlacedPolygons(self, after), i[chosen], j[chosen])
         points = placed.contacts(features_of(vertex, edge, np.full(len(edge), -1)))
         return points[~are_known(points, contacts)]
 
@@ -155,6 +155,17 @@ class Polygons(Bodies):
         Both outlines run counter-clockwise, so facing edges run against each other: where one starts the other ends.
         """
         return np.where(corner == edge, self.previous_vertex[vertex], vertex)
+
+    def without_duplicates(self, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Keep each pair of corners once, seen from the lower numbered vertex, and sort all by vertex and edge."""
+        swap, facing = (corner >= 0) & (vertex > corner), self.facing_edge(vertex, edge, corner)
+        edge = np.where(swap, facing, edge)
+        vertex, corner = np.where(swap, corner, vertex), np.where(swap, vertex, corner)
+        # The pair may have been found from both sides, and two corners may meet along two pairs of faces.
+        low = np.minimum(edge, self.next_vertex[edge])
+        end = np.where(corner < 0, 0, np.where(corner == low, 1, 2))
+        _, first = np.unique((vertex.astype(np.int64) * len(self.vertices) + edge) * 3 + end, return_index=True)
+        return vertex[first], edge[first], corner[first]
 
     def end_zone(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) array [m]: how near the end of the edge the corner counts as standing on the corner there."""
@@ -274,7 +285,7 @@ class PlacedPolygons:
         """Give the unit vectors from corners to the next and to the previous corner, (n, 2) arrays."""
         return taken(self.directions, vertex), -taken(self.directions, self.shapes.previous_vertex[vertex])
 
-    def classified_ends(self, vertex: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def classified_ends(self, vertex: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, ...]:
         """Drop corners past the end of their edge, and find those on the corner there."""
         shapes, vertices = self.shapes, self.vertices
         along, gap = self.seen_from_edges(vertex, edge)
@@ -295,7 +306,7 @@ class PlacedPolygons:
         halfway = _unit(along_edge + along_facing + 1e-300)
         distance = np.abs(dot(vertices[vertex] - vertices[other], halfway))
         corner = np.where(at_end & parallel & (distance <= end), other, -1)
-        return _without_duplicates(shapes, vertex[chosen], edge[chosen], corner[chosen])
+        return shapes.without_duplicates(vertex[chosen], edge[chosen], corner[chosen])
 
     def are_closest_faces(self, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
         """Whether to keep each pair: of two corners that meet along two pairs of faces, only where these are closest.
@@ -313,6 +324,33 @@ class PlacedPolygons:
         np.maximum.at(closest, pair, closeness)
         kept[k] = closeness >= closest[pair] - 1e-9
         return kept
+
+    def passed_edges(self, after: PlacedPolygons, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners of blocks that go through edges of others in a movement, and these edges, (n,) int arrays.
+
+        Of blocks i and j, (n_pairs,) int, that overlap after it. Of several edges it is the one that the corner went
+        through last, seen from the block that has the edge.
+        """
+        shapes, offsets, counts = self.shapes, self.shapes.offsets, np.diff(self.shapes.offsets)
+        a, b = np.concatenate([i, j]), np.concatenate([j, i])
+        owner, position = expand_ranges(counts[a] * counts[b])
+        vertex, edge = offsets[a][owner] + position // counts[b][owner], offsets[b][owner] + position % counts[b][owner]
+        places, heights = zip(*(placed.seen_from_edges(vertex, edge) for placed in (self, after)), strict=True)
+        width = np.minimum(shapes.widths[a], shapes.widths[b])[owner]
+        came = shapes.convex_vertex[vertex] & (heights[1] < 0.0) & (heights[0] > heights[1])
+        came &= heights[0] >= -PENETRATION_FRACTION * width
+        part = np.clip(heights[0] / np.where(came, heights[0] - heights[1], 1.0), 0.0, 1.0)
+        along = places[0] + part * (places[1] - places[0])
+        # Past a re-entrant corner is still the block.
+        start, end = (
+            np.where(shapes.convex_vertex[corner], CORNER_TOLERANCE, PENETRATION_FRACTION) * width
+            for corner in (edge, shapes.next_vertex[edge])
+        )
+        k = np.flatnonzero(came & (along >= -start) & (along <= shapes.edge_lengths[edge] + end))
+        # Those it was behind before come last.
+        order = k[np.lexsort((np.minimum(heights[0][k], 0.0) / width[k] + part[k], vertex[k], owner[k]))]
+        last = np.append((np.diff(owner[order]) != 0) | (np.diff(vertex[order]) != 0), True)[: len(order)]
+        return vertex[order[last]], edge[order[last]]
 
 
 def features_of(vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
@@ -363,53 +401,9 @@ def _areas(shapes: Polygons, contacts: Contacts) -> np.ndarray:
     return length.reshape(-1, 2).sum(axis=1) * thickness
 
 
-def _passed_edges(
-    before: PlacedPolygons, after: PlacedPolygons, i: np.ndarray, j: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of blocks that have gone through edges of others in a movement, and these edges, (n,) int arrays.
-
-    Of blocks i and j, (n_pairs,) int, that overlap after it. Of several edges it is the one that the corner went
-    through last, seen from the block that has the edge.
-    """
-    shapes, offsets, counts = before.shapes, before.shapes.offsets, np.diff(before.shapes.offsets)
-    a, b = np.concatenate([i, j]), np.concatenate([j, i])
-    owner, position = expand_ranges(counts[a] * counts[b])
-    vertex, edge = offsets[a][owner] + position // counts[b][owner], offsets[b][owner] + position % counts[b][owner]
-    places, heights = zip(*(placed.seen_from_edges(vertex, edge) for placed in (before, after)), strict=True)
-    width = np.minimum(shapes.widths[a], shapes.widths[b])[owner]
-    came = shapes.convex_vertex[vertex] & (heights[1] < 0.0) & (heights[0] > heights[1])
-    came &= heights[0] >= -PENETRATION_FRACTION * width
-    part = np.clip(heights[0] / np.where(came, heights[0] - heights[1], 1.0), 0.0, 1.0)
-    along = places[0] + part * (places[1] - places[0])
-    # Past a re-entrant corner is still the block.
-    start, end = (
-        np.where(shapes.convex_vertex[corner], CORNER_TOLERANCE, PENETRATION_FRACTION) * width
-        for corner in (edge, shapes.next_vertex[edge])
-    )
-    k = np.flatnonzero(came & (along >= -start) & (along <= shapes.edge_lengths[edge] + end))
-    # Those it was behind before come last.
-    order = k[np.lexsort((np.minimum(heights[0][k], 0.0) / width[k] + part[k], vertex[k], owner[k]))]
-    last = np.append((np.diff(owner[order]) != 0) | (np.diff(vertex[order]) != 0), True)[: len(order)]
-    return vertex[order[last]], edge[order[last]]
-
-
 def _inward(to_next: np.ndarray, to_previous: np.ndarray) -> np.ndarray:
     """(n, 2) array: from corners into their blocks, along the bisectors of their flanks."""
     return np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
-
-
-def _without_duplicates(
-    shapes: Polygons, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Keep each pair of corners once, seen from the lower numbered vertex, and sort the pairs by vertex and edge."""
-    swap, facing = (corner >= 0) & (vertex > corner), shapes.facing_edge(vertex, edge, corner)
-    edge = np.where(swap, facing, edge)
-    vertex, corner = np.where(swap, corner, vertex), np.where(swap, vertex, corner)
-    # The pair may have been found from both sides, and two corners may meet along two pairs of faces.
-    low = np.minimum(edge, shapes.next_vertex[edge])
-    end = np.where(corner < 0, 0, np.where(corner == low, 1, 2))
-    _, first = np.unique((vertex.astype(np.int64) * len(shapes.vertices) + edge) * 3 + end, return_index=True)
-    return vertex[first], edge[first], corner[first]
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
