@@ -252,12 +252,9 @@ class Assembly(Kept, Shown):
 
     def index(self, name: str) -> int:
         """Find the number of the block with this name; raises ``ValueError`` where there is none."""
-        try:
-            return self._numbers[name]
-        except KeyError:
-            raise ValueError(
-                f"no block is named '{name}'; the assembly has {counted(self.n_blocks, 'block')}"
-            ) from None
+        if name not in self._numbers:
+            raise ValueError(f"no block is named '{name}'; the assembly has {counted(self.n_blocks, 'block')}")
+        return self._numbers[name]
 
     @kept
     def _numbers(self) -> dict[str, int]:

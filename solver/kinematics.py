@@ -36,8 +36,7 @@ class Pose:
             raise ValueError(f"a pose has {what}; give d and d (d - 1) / 2 numbers per block")
         for block in np.flatnonzero(~np.isfinite(np.hstack([positions, rotations])).all(axis=1)):
             raise ValueError(f"the pose of block {block} is {positions[block]}, {rotations[block]}; not finite")
-        object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "rotations", rotations)
+        vars(self).update(positions=positions, rotations=rotations)
 
     @classmethod
     def initial(cls, assembly: Assembly) -> Pose:

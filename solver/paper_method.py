@@ -43,12 +43,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver import tolerances
-from solver.assembly import Assembly, find_contacts
+from solver.assembly import find_contacts
 from solver.equilibrium import friction_rays, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
-from solver.interfaces import Interfaces
 from solver.kinematics import Pose, motion_size, moved, moved_vertices, put_together, relative_velocities
-from solver.loads import Loads, Settlement
+from solver.loads import Settlement
 from solver.path.controls import Ending
 from solver.path.drivers import SupportMotion
 from solver.path.reports import no_equilibrium, wedged
@@ -66,9 +65,6 @@ LINEARISATIONS = 10
 
 #: Cost of unbalanced force beside the reaction: above the speed of any block per speed of the supports.
 UNBALANCED_COST = 1e4
-
-#: Blocks, the laws of their joints, and the loads on them.
-Inputs = tuple[Assembly, Interfaces, Loads]
 
 
 class SupportsLocked(Exception):
@@ -97,7 +93,7 @@ class ProgramSolution:
 
 
 def solve_program(
-    inputs: Inputs, pose: Pose, contacts: Contacts, gaps: np.ndarray, supports: np.ndarray, trust: float
+    model: Model, pose: Pose, contacts: Contacts, gaps: np.ndarray, supports: np.ndarray, trust: float
 ) -> ProgramSolution:
     """State the program of an increment at a geometry, and solve it.
 
@@ -109,14 +105,12 @@ def solve_program(
     A c + f + r⁺ - r⁻ = 0. They are dual to the bound ρ of all displacements and cost too much to be used wherever the
     loads can be balanced.
     """
-    assembly, interfaces, loads = inputs
-    load = loads.dead_at(assembly, pose)
-    length, free = assembly.block_size, assembly.free
-    units = np.array([length, length, 1.0])
+    assembly, length, units, free = model.assembly, model.length, model.lengths, model.assembly.free
+    load = model.loads.dead_at(assembly, pose)
     force = float(np.hypot(*load[free, :2].T).mean())
     load = load / (force * length / units)
     total = float(np.abs(load[free, :2]).sum())
-    friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+    friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
     takes_part = np.isfinite(gaps[:, 0])
     rays, wrench = friction_rays(friction)[:, np.repeat(takes_part, 2)], wrench_matrix(contacts, pose, length)
     wide = takes_part[:, None] & (np.abs(gaps) >= tolerances.FEASIBILITY_TOLERANCE * length)
@@ -189,11 +183,10 @@ class _Equilibrium:
 class _Phase:
     """One settlement, phase ``number``, from the pose ``start``."""
 
-    def __init__(self, inputs: Inputs, phase: Settlement, number: int, start: Pose) -> None:
-        self.inputs, self.assembly, self.phase, self.number = inputs, inputs[0], phase, number
-        self.driver, self.start, self.programs = SupportMotion(inputs[0], phase, start), start, 0
-        self.length = self.assembly.block_size
-        self.lever = self.driver.lever(Model(*inputs, self.length, 1.0, np.zeros(len(start.positions), dtype=bool)))
+    def __init__(self, model: Model, phase: Settlement, number: int, start: Pose) -> None:
+        self.model, self.assembly, self.phase, self.number = model, model.assembly, phase, number
+        self.driver, self.start, self.programs = SupportMotion(model.assembly, phase, start), start, 0
+        self.length, self.lever = model.length, self.driver.lever(model)
         movement = self.lever * phase.increment
         #: Largest gap [m] that one program may close, largest displacement [m] in it, largest gap [m] that may be left.
         self.reach = max(min(4.0 * movement, self.length / 2.0), self.length / 4.0)
@@ -208,15 +201,15 @@ class _Phase:
         """Solve a program, by default of the gaps at the pose, with the supports fixed."""
         self.programs += 1
         gaps = np.column_stack([contacts.gaps, np.zeros(len(contacts))])
-        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs[2].dead), "trust": self.trust}
+        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.model.load), "trust": self.trust}
         arguments = default | arguments
         try:
-            return solve_program(self.inputs, pose, contacts, **arguments)
+            return solve_program(self.model, pose, contacts, **arguments)
         except SupportsLocked:
             # Drawings and programs are off by as much; blocks that are wedged cannot give way to it.
             is_small = np.abs(arguments["gaps"]) < tolerances.ACCEPTED_ERROR * self.length
             arguments["gaps"] = np.where(is_small, 0.0, arguments["gaps"])
-        return solve_program(self.inputs, pose, contacts, **arguments)
+        return solve_program(self.model, pose, contacts, **arguments)
 
     def evaluate(self, s: float, pose: Pose) -> _Equilibrium:
         """Read forces and velocities at a pose: the program of a vanishing step, of closed joints only."""
@@ -335,19 +328,12 @@ class _Phase:
 
 
 def linear_program_increments(
-    assembly: Assembly,
-    phases: Sequence[Settlement],
-    interfaces: Interfaces,
-    loads: Loads,
-    resume: PathState | None = None,
+    model: Model, phases: Sequence[Settlement], resume: PathState | None
 ) -> Generator[Increment, None, Ending]:
     """Yield the increments of settlements in the plane by the paper's linear programs; return how they ended."""
-    if not np.abs(loads.dead[assembly.free, :2]).any():
-        raise ValueError("no load acts on any free block; give them a weight")
-    first, pose = (0, Pose.initial(assembly)) if resume is None else (resume.phase, resume.start)
-    ending = Ending(Status.LIMIT_REACHED)
+    first, pose = (0, Pose.initial(model.assembly)) if resume is None else (resume.phase, resume.start)
     for number, phase in enumerate(phases[first:], start=first):
-        path, reported = _Phase((assembly, interfaces, loads), phase, number, pose), resume is not None
+        path, reported = _Phase(model, phase, number, pose), resume is not None
         step, upper_bound = phase.increment, np.inf
         try:
             if resume is not None:
@@ -358,7 +344,7 @@ def linear_program_increments(
                 current = path.close_joints(0.0, pose, path.solve(pose, path.contacts(pose)))
         except _NoEquilibrium as error:
             yield path.reported(error.solution, 0.0, 0.0, Status.FALLING)
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(assembly, error.solution.state.velocity))
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, error.solution.state.velocity))
         except (SupportsLocked, _JointsOpen, SolveError) as error:
             return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
         ending, pose = yield from path.follow(current, step, upper_bound, reported=reported)

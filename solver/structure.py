@@ -76,10 +76,8 @@ class Structure(Shown):
                 f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name"
             )
         interfaces.check(checked(assembly, Assembly, "assembly"))
-        object.__setattr__(self, "assembly", assembly)
-        object.__setattr__(self, "interfaces", interfaces)
-        object.__setattr__(self, "loads", checked_loads(assembly, loads))
-        object.__setattr__(self, "ties", tuple(checked(tie, Tie, "one of the ties") for tie in ties))
+        loads, ties = checked_loads(assembly, loads), tuple(checked(tie, Tie, "one of the ties") for tie in ties)
+        vars(self).update(assembly=assembly, interfaces=interfaces, loads=loads, ties=ties)
 
     def __repr__(self) -> str:
         """Say how many blocks it has."""
@@ -147,15 +145,7 @@ class Structure(Shown):
         if self.loads.live.any():
             warnings.warn("a settlement leaves the live loads out; add what acts during it to the dead", stacklevel=2)
         phases = _phases(settlement)
-        increments = settlement_increments(
-            self.assembly,
-            phases,
-            interfaces=self.interfaces,
-            loads=self.loads,
-            controls=controls,
-            ties=self.ties,
-            changes=changes,
-        )
+        increments = settlement_increments(phases=phases, controls=controls, changes=changes, **vars(self))
         measures = {"parameter": settlement_in(phases[0].unit), "measured": reaction_to(phases[0].unit)}
         return self._response(increments, on_increment, settlements=phases, changes=tuple(changes), **measures)
 
@@ -204,8 +194,8 @@ class Structure(Shown):
         The path is that of a settlement, see :mod:`solver.path.path`, with the multiplier as one more unknown and the
         control displacement as one more equation.
         """
-        given = self._standing(pose, ties_at, bonds_at, fallen) | {"loads": self.loads, "interfaces": self.interfaces}
-        increments = pushover_increments(self.assembly, control, controls=controls, **given)
+        given = vars(self) | _standing(pose, ties_at, bonds_at, fallen)
+        increments = pushover_increments(control=control, controls=controls, **given)
         kind = {"analysis": "pushover", "parameter": CONTROL_DISPLACEMENT, "measured": LOAD_MULTIPLIER}
         return self._response(increments, on_increment, settlements=(), control=control, **kind)
 
@@ -278,9 +268,9 @@ class Structure(Shown):
         of the model, and an upper bound for every other flow rule with the same friction.
         """
         under = self if acceleration is None else self.with_live(acceleration=acceleration)
-        given = self._standing(pose, ties_at, bonds_at, fallen) | {"flow": flow, "torsion": torsion}
+        given = vars(under) | _standing(pose, ties_at, bonds_at, fallen) | {"flow": flow, "torsion": torsion}
         given |= {"closed_gap": closed_gap, "displacement": displacement, "overlap_tolerance": overlap_tolerance}
-        found = find_limit_load(self.assembly, self.interfaces, under.loads, **given)
+        found = find_limit_load(**given)
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))
 
     def envelope(
@@ -312,29 +302,21 @@ class Structure(Shown):
         limits = (self.with_live(live(float(x))).limit_load(torsion=torsion, **given) for x in positions)
         return Envelope(positions, tuple(limits))
 
-    def _standing(
-        self, pose: Pose | None, ties_at: TieForces | None, bonds_at: Bonds | None, fallen: np.ndarray | None
-    ) -> dict[str, Any]:
-        """Arguments of an analysis that begins at an increment, which these tell of."""
-        ties_at = ties_at if ties_at is None else checked(ties_at, TieForces, "ties_at")
-        bonds_at = bonds_at if bonds_at is None else checked(bonds_at, Bonds, "bonds_at")
-        return {"pose": pose, "ties": self.ties, "ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen}
-
     def _response(
         self, increments: Increments, on_increment: Callable[[Increment], None] | None, **analysed: Any
     ) -> Response:
-        found, ending = increments.all(on_increment), increments.ending
-        return Response(
-            assembly=self.assembly,
-            interfaces=self.interfaces,
-            loads=self.loads,
-            increments=found,
-            stop=ending.stop,
-            message=ending.message,
-            collapse=ending.collapse,
-            ties=self.ties,
-            **analysed,
-        )
+        """Find all increments; a response has the fields of the structure, and those of how they ended."""
+        found = increments.all(on_increment)
+        return Response(increments=found, **vars(self), **vars(increments.ending), **analysed)
+
+
+def _standing(
+    pose: Pose | None, ties_at: TieForces | None, bonds_at: Bonds | None, fallen: np.ndarray | None
+) -> dict[str, Any]:
+    """Arguments of an analysis that begins at an increment, which these tell of."""
+    ties_at = ties_at if ties_at is None else checked(ties_at, TieForces, "ties_at")
+    bonds_at = bonds_at if bonds_at is None else checked(bonds_at, Bonds, "bonds_at")
+    return {"pose": pose, "ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen}
 
 
 def _phases(settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray) -> tuple[Settlement, ...]:

@@ -106,28 +106,27 @@ def find_limit_load(
     told = (ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at).held(ties, gone)
     force = mean_load(left, loads) or float(np.abs(loads.live[left.free]).max())
     model = Model(left, interfaces, loads, left.block_size, force, gone, has_live=True, ties=tuple(ties))
-    model = model.without(gone) if gone.any() else model
-    problem = _Problem(model, pose, closed_gap, displacement, torsion, told, bonds_at)
-    program, status = problem.program, LimitStatus.FOUND
+    program = _AtPose(model.without(gone), pose, closed_gap, displacement, torsion, told, bonds_at)
+    status = LimitStatus.FOUND
     balanced, unbalanced = program.most_balanced(with_live=False)
     if unbalanced > FALLING_FRACTION:
         falling, status = balanced, LimitStatus.HELD
         balanced, unbalanced = program.most_balanced()
         if unbalanced > FALLING_FRACTION:
-            return problem.result(falling, LimitStatus.NO_EQUILIBRIUM, flow)
+            return program.result(falling, LimitStatus.NO_EQUILIBRIUM, flow)
     try:
         if flow == "associative":
-            return problem.result(program.bound(-1.0, balanced), status, flow)
-        state, converged = non_associative_limit(program, problem.at_rest(balanced), balanced)
+            return program.result(program.bound(-1.0, balanced), status, flow)
+        state, converged = non_associative_limit(program, program.at_rest(balanced), balanced)
     except Unbounded:
-        return problem.result(balanced, LimitStatus.UNBOUNDED, flow)
+        return program.result(balanced, LimitStatus.UNBOUNDED, flow)
     if converged:
-        return problem.result(state, status, flow)
+        return program.result(state, status, flow)
     most = np.inf
     with suppress(SolveError, Unbounded):
         associative = program.bound(-1.0, balanced)
         most, state = associative.multiplier * program.unit, min(state, associative, key=lambda of: of.multiplier)
-    nearest = problem.result(state, LimitStatus.NOT_CONVERGED, flow)
+    nearest = program.result(state, LimitStatus.NOT_CONVERGED, flow)
     return replace(nearest, bounds=(nearest.multiplier, most))
 
 
@@ -143,7 +142,7 @@ def _check_options(assembly: Assembly, flow: str, torsion: str, ties: Sequence[T
         raise ValueError(f"torsion = 'uniform' knows no ties ('{ties[0].name}'); take torsion = 'points'")
 
 
-class _Problem:
+class _AtPose(StaticProgram):
     """The static program of one geometry, with gaps beyond the give of joints, by which they are open or closed."""
 
     def __init__(
@@ -196,17 +195,14 @@ class _Problem:
             live, _ = model.scaled_live(pose)
             total = np.linalg.norm(live[:, :d], axis=1).sum() or np.linalg.norm(live[:, d:], axis=1).sum()
             price = np.where(is_open, gaps, 0.0) / displacement / total
+        super().__init__(model, pose, contacts, friction, limits, price, senses=(1.0,), faces=faces, exact=True)
         self.gaps, self.ties_at = gaps, ties_at
-        self.program = StaticProgram(
-            model, pose, contacts, friction, limits, price, senses=(1.0,), faces=faces, exact=True
-        )
 
     def at_rest(self, balanced: ProgramState) -> np.ndarray:
         """(n,) array: normal forces of the state of least elastic energy under the dead load, where there is one."""
-        program, contacts = self.program, self.program.contacts
+        none, compliance = np.zeros_like(self.contacts.points), Stepper.joint_compliance(self.contacts)
         try:
-            compliance = Stepper.joint_compliance(contacts)
-            forces = program.nearest(np.zeros_like(contacts.points), compliance, balanced.multiplier) - program.least
+            forces = self.nearest(none, compliance, balanced.multiplier) - self.least
         except NotSolved:
             # In balance to rounding only: there is hardly a choice of forces.
             forces = balanced.forces
@@ -214,26 +210,26 @@ class _Problem:
 
     def result(self, state: ProgramState, status: LimitStatus, flow: str) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
-        program, model, multiplier = self.program, self.program.model, state.multiplier
+        model, multiplier = self.model, state.multiplier
         if status is LimitStatus.UNBOUNDED:
             state = replace(state, velocity=np.zeros_like(state.velocity), face_rates=0.0)
-        velocity, (kinematic, violation) = state.velocity, program.kinematic(state)
-        balance = program.matrix @ state.forces.ravel() + program.dead + multiplier * program.live
-        total, crushing = model.total_load or 1.0, program.limits.beyond_least
+        velocity, (kinematic, violation) = state.velocity, self.kinematic(state)
+        balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
+        total, crushing = model.total_load or 1.0, self.limits.beyond_least
         size, mechanism = float(np.abs(velocity).max(initial=0.0)) or 1.0, np.zeros_like(model.load)
         mechanism[model.assembly.free] = velocity.reshape(-1, model.n_dof) / size
         mechanism /= unit_lengths(model.n_dof, model.length)
         found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
-        static = multiplier * program.unit
-        forces = state.forces + program.least
+        static = multiplier * self.unit
+        forces = state.forces + self.least
         nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
-        in_place = replace(program.contacts, gaps=self.gaps)
+        in_place = replace(self.contacts, gaps=self.gaps)
         return LimitLoad(
             multiplier=static if found else nothing,
-            bounds=(static, kinematic * program.unit) if found else (nothing, nothing),
+            bounds=(static, kinematic * self.unit) if found else (nothing, nothing),
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
-                friction_excess=program.friction_excess(state.forces, program.limits.cohesion) / total,
+                friction_excess=self.friction_excess(state.forces, self.limits.cohesion) / total,
                 carrying_gap=carrying_gap(in_place, forces),
                 largest_penetration=largest_penetration(in_place),
                 duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
@@ -242,28 +238,28 @@ class _Problem:
             status=status,
             flow=flow,
             live_force=model.live_force,
-            programs=program.programs,
-            torsion=POINTS if program.faces is None else UNIFORM,
+            programs=self.programs,
+            torsion=POINTS if self.faces is None else UNIFORM,
             held_by=model.held_by(-balance.reshape(-1, model.n_dof)) if status is LimitStatus.NO_EQUILIBRIUM else "",
             held=self._held(forces * model.force, mechanism, state.forces[:, 0] >= crushing * (1.0 - USED_UP)),
         )
 
     def _held(self, forces: np.ndarray, mechanism: np.ndarray, at_strength: np.ndarray) -> State:
         """The arrays of a limit load, from forces [N], and which points carry their compressive strength."""
-        program, model = self.program, self.program.model
-        between, on_blocks = ~is_member(program.contacts), block_forces(program.contacts, program.pose, forces)
-        contacts = program.contacts[between]
+        model = self.model
+        between, on_blocks = ~is_member(self.contacts), block_forces(self.contacts, self.pose, forces)
+        contacts = self.contacts[between]
         return State(
-            pose=program.pose,
+            pose=self.pose,
             contacts=contacts,
             forces=forces[between],
-            displacements=relative_velocities(contacts, program.pose, mechanism),
-            friction=program.friction[between],
+            displacements=relative_velocities(contacts, self.pose, mechanism),
+            friction=self.friction[between],
             velocity=mechanism,
             support_forces=np.where(model.assembly.free[:, None], 0.0, on_blocks),
             fell_at=np.where(model.fallen, -np.inf, np.nan) if model.fallen.any() else np.zeros(0),
-            ties=plastic_forces(program.contacts, forces, model.ties, self.ties_at),
-            crushing=at_strength[between] if np.isfinite(program.limits.most[between]).any() else at_strength[:0],
+            ties=plastic_forces(self.contacts, forces, model.ties, self.ties_at),
+            crushing=at_strength[between] if np.isfinite(self.limits.most[between]).any() else at_strength[:0],
         )
 
 

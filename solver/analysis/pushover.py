@@ -63,8 +63,6 @@ def pushover_increments(
     if not left.free[assembly.index(control.block)]:
         what = "has left the structure" if assembly.free[assembly.index(control.block)] else "is a support"
         raise ValueError(f"control block '{control.block}' {what}; name a free block")
-    if resume is not None:
-        resume.refuse_other(assembly.n_blocks, 1)
     check_ties(ties, assembly, 0 if ties_at is None else np.inf)
     origin = at_origin(assembly)
     near, loads, ties = without_origin(origin, assembly, loads, ties)
@@ -72,6 +70,7 @@ def pushover_increments(
         control = replace(control, point=(np.asarray(control.point) - origin).tolist())
     start = Pose.initial(near) if pose is None else Pose(checked(pose, Pose, "pose").positions - origin, pose.rotations)
     if resume is not None:
+        resume.refuse_other(assembly.n_blocks, 1)
         start = resume.start
     model = model_of(near, loads, interfaces, controls, has_live=True, ties=ties)
     path = Path(model, ControlledLoad(near, control, start), 0, controls, on_step)

@@ -66,10 +66,12 @@ def settlement_increments(
     local = tuple(nearer(phase, origin) for phase in phases) if origin.any() else tuple(phases)
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
+    each = (loads_in(loads, changes, number) for number in range(len(local)))
+    models = [model_of(near, of_phase, interfaces, controls, ties=near_ties) for of_phase in each]
     if by_program:
-        steps = linear_program_increments(near, local, interfaces, loads, resume)
+        steps = linear_program_increments(models[0], local, resume)
     else:
-        steps = _increments(near, local, interfaces, loads, controls, resume, near_ties, changes, on_step)
+        steps = _increments(models, local, controls, resume, changes, on_step)
     return Increments(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
 
@@ -90,29 +92,23 @@ def _refuse_by_program(
 
 
 def _increments(
-    assembly: Assembly,
+    models: Sequence[Model],
     phases: Sequence[Settlement],
-    interfaces: Interfaces,
-    loads: Loads,
     controls: Controls,
     resume: PathState | None,
-    ties: tuple[Tie, ...],
     changes: Sequence[PhaseChange],
     on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
-    first = 0 if resume is None else resume.phase
+    first, assembly = 0 if resume is None else resume.phase, models[0].assembly
     before: PathState | None = None
-    ending = Ending(Status.LIMIT_REACHED, "the settlement has reached its limit")
-    # Numbers that pass from phase to phase are in the unit of the first.
-    unit = model_of(assembly, loads_in(loads, changes, 0), interfaces, controls).force
     for number, phase in enumerate(phases[first:], start=first):
         start = Pose.initial(assembly) if before is None else before.history[0].pose
         start = start if resume is None else resume.start
-        model = model_of(assembly, loads_in(loads, changes, number), interfaces, controls, ties=ties)
-        model = replace(model, force=unit)
+        # Numbers that pass from phase to phase are in the unit of the first.
+        model = replace(models[number], force=models[0].force)
         path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
         begin, now = partial(path.begin, start, before), [change for change in changes if change.phase == number]
-        if now or (number and any(tie.phase == number + 1 for tie in ties)):
+        if now or (number and any(tie.phase == number + 1 for tie in model.ties)):
             gone = {name for change in now for name in change.ties}
             begin = partial(path.changed, begin, removed_before(changes, number, assembly.n_blocks), gone)
         ending = yield from path.increments(begin, resume)
@@ -134,18 +130,9 @@ def model_of(
     force = mean_load(assembly, loads)
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
-    return Model(
-        assembly,
-        interfaces,
-        loads,
-        assembly.block_size,
-        force,
-        np.zeros(assembly.n_blocks, dtype=bool),
-        has_live=has_live,
-        ties=ties,
-        compliance=controls.compliance_factor,
-        imperfection=controls.imperfection_factor,
-    )
+    units, none = (assembly.block_size, force), np.zeros(assembly.n_blocks, dtype=bool)
+    factors = {"compliance": controls.compliance_factor, "imperfection": controls.imperfection_factor}
+    return Model(assembly, interfaces, loads, *units, none, has_live=has_live, ties=ties, **factors)
 
 
 def check_settlement(

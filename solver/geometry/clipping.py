@@ -10,8 +10,8 @@ from solver.tolerances import CORNER_TOLERANCE
 
 from .convex_parts import ENDS, PlacedParts
 from .facing import SMALLEST_SINE
-from .outlines import next_vertices
-from .portions import alike
+from .outlines import next_vertices, turn
+from .portions import alike, at_largest
 from .solids import cross, dot, stacked, taken, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
 
@@ -23,6 +23,21 @@ class ClippedCorners(NamedTuple):
     features: np.ndarray  #: (n, 4) int
     areas: np.ndarray  #: (n,) [m²]: tributary area of each corner in its polygon
     widths: np.ndarray  #: (n,) [m], of the polygon; infinite at the end of a line along a cut
+
+
+class _Outlines:
+    """One face of each of n pairs, in the plane half-way between both: corners and edges, (n, m) int, and places."""
+
+    def __init__(self, corner: np.ndarray, edge: np.ndarray, points: np.ndarray) -> None:
+        self.corner, self.edge, self.points = corner, edge, points
+        self.along = np.roll(points, -1, axis=1) - points
+        self.lengths = np.maximum(np.hypot(self.along[..., 0], self.along[..., 1]), 1e-300)
+
+    def compare(self, other: _Outlines, end: np.ndarray) -> None:
+        """Find how far corners are inside each edge of the others, (n, m, m_other) [m], and which are inside of all."""
+        directions = other.along / other.lengths[..., None]
+        self.inside = turn(directions[:, None], self.points[:, :, None] - other.points[:, None])
+        self.used = self.inside.min(axis=2) >= -end
 
 
 def clipped_faces(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:
@@ -43,29 +58,20 @@ def _clipped(
     # Corners of a run clockwise seen along the normal of b; turned round, both run counter-clockwise. Edge k of either
     # polygon runs from its corner k to the next, which for a is the edge that starts at the latter.
     corner_a = corner_a[:, ::-1]
-    edge_a, edge_b = np.roll(corner_a, -1, axis=1), corner_b
     normal = unit(taken(faces.normals, face_b) - taken(faces.normals, face_a))
     x = taken(faces.tangents, face_b)
     x = unit(x - dot(x, normal)[:, None] * normal)
     y = cross(normal, x)
     origin = faces.middles[face_b][:, None]
-    a, b = (
-        stacked([dot(arms, x[:, None]), dot(arms, y[:, None])])
-        for arms in (placed.starts(corner) - origin for corner in (corner_a, corner_b))
-    )
-    along_a, along_b = np.roll(a, -1, axis=1) - a, np.roll(b, -1, axis=1) - b
-    long_a, long_b = (np.maximum(np.hypot(d[..., 0], d[..., 1]), 1e-300) for d in (along_a, along_b))
-    unit_a, unit_b = along_a / long_a[..., None], along_b / long_b[..., None]
+    arms_a, arms_b = placed.starts(corner_a) - origin, placed.starts(corner_b) - origin
+    points_a, points_b = (stacked([dot(arms, x[:, None]), dot(arms, y[:, None])]) for arms in (arms_a, arms_b))
+    a, b = _Outlines(corner_a, np.roll(corner_a, -1, axis=1), points_a), _Outlines(corner_b, corner_b, points_b)
     end = CORNER_TOLERANCE * np.minimum(solids.shortest_edges[face_a], solids.shortest_edges[face_b])[:, None]
 
-    # How far each corner is inside each edge of the other polygon: (n, corners, edges).
-    a_in_b, b_in_a = _inside(a, b, unit_b), _inside(b, a, unit_a)
-    used_a, used_b = a_in_b.min(axis=2) >= -end, b_in_a.min(axis=2) >= -end
-    apart = np.abs(a[:, :, None] - b[:, None]).max(axis=3)
-    both = (apart <= 2.0 * end[..., None]) & used_a[:, :, None] & used_b[:, None]
-
-    tight = end[..., None]
-    crosses, on_a, on_b = _crossings(a_in_b, b_in_a, (long_a, long_b), (used_a, used_b), tight)
+    a.compare(b, end)
+    b.compare(a, end)
+    apart = np.abs(a.points[:, :, None] - b.points[:, None]).max(axis=3)
+    both = (apart <= 2.0 * end[..., None]) & a.used[:, :, None] & b.used[:, None]
     pair, p, q = np.nonzero(both)
     own, other = corner_a[pair, p], corner_b[pair, q]
     # Where the face of one block alone goes on, the corner of the other is on that face.
@@ -73,80 +79,57 @@ def _clipped(
     vertex, face = solids.corners[np.where(goes_b, own, other)], np.where(goes_b, face_b[pair], face_a[pair])
     alone = (goes_a != goes_b)[:, None]
     features = np.where(alone, feature_rows(ON_FACE, vertex, face, -1), feature_rows(ON_CORNER, own, other, -1))
-    on_corner = pair, features, (a[pair, p] + b[pair, q]) / 2.0
-    alone_a, alone_b = used_a & ~both.any(axis=2), used_b & ~both.any(axis=1)
-    vertex_a = _on_face(placed, end, alone_a, a, a_in_b, corner_a, face_b, edge_b)
-    vertex_b = _on_face(placed, end, alone_b, b, b_in_a, corner_b, face_a, edge_a)
+    on_corner = pair, features, (a.points[pair, p] + b.points[pair, q]) / 2.0
+    vertex_a = _on_face(placed, end, a, b, face_b, a.used & ~both.any(axis=2))
+    vertex_b = _on_face(placed, end, b, a, face_a, b.used & ~both.any(axis=1))
+    crosses, on_a, on_b = _crossings(a, b, end[..., None])
     pair, p, q = np.nonzero(crosses)
     u, v = on_a[pair, p, q], on_b[pair, p, q]
-    turn = along_a[pair, p, 0] * along_b[pair, q, 1] - along_a[pair, p, 1] * along_b[pair, q, 0]
-    sine = np.abs(turn) / (long_a[pair, p] * long_b[pair, q])
+    sine = np.abs(turn(a.along[pair, p], b.along[pair, q])) / (a.lengths[pair, p] * b.lengths[pair, q])
     # The edge of a runs the other way round in its face: fractions count from the corner it starts at there.
     places = places_of(1.0 - u, v, sine < SMALLEST_SINE)
-    crossings = a[pair, p] + u[:, None] * along_a[pair, p]
-    across = pair, feature_rows(ACROSS, edge_a[pair, p], edge_b[pair, q], places), crossings
+    crossings = a.points[pair, p] + u[:, None] * a.along[pair, p]
+    across = pair, feature_rows(ACROSS, a.edge[pair, p], b.edge[pair, q], places), crossings
     owner, features, points = map(np.concatenate, zip(on_corner, vertex_a, vertex_b, across, strict=True))
     areas, wide = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
     return ClippedCorners(owner[kept], features[kept], areas[kept], wide[owner[kept]])
 
 
-def _crossings(
-    a_in_b: np.ndarray,
-    b_in_a: np.ndarray,
-    long: tuple[np.ndarray, np.ndarray],
-    used: tuple[np.ndarray, np.ndarray],
-    tight: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _crossings(a: _Outlines, b: _Outlines, tight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which edges of two polygons cross, (n, edges of a, edges of b) bool, and how far along either."""
     # Edge k of a crosses edge l of b where the ends of each are on different sides of the other.
-    next_a, next_b = np.roll(a_in_b, -1, axis=1), np.roll(b_in_a, -1, axis=1)
-    crosses = ((a_in_b > 0.0) != (next_a > 0.0)) & np.swapaxes((b_in_a > 0.0) != (next_b > 0.0), 1, 2)
-    crosses &= ~((np.abs(a_in_b) <= tight) & (np.abs(next_a) <= tight))
-    crosses &= ~np.swapaxes((np.abs(b_in_a) <= tight) & (np.abs(next_b) <= tight), 1, 2)
+    next_a, next_b = np.roll(a.inside, -1, axis=1), np.roll(b.inside, -1, axis=1)
+    crosses = ((a.inside > 0.0) != (next_a > 0.0)) & np.swapaxes((b.inside > 0.0) != (next_b > 0.0), 1, 2)
+    crosses &= ~((np.abs(a.inside) <= tight) & (np.abs(next_a) <= tight))
+    crosses &= ~np.swapaxes((np.abs(b.inside) <= tight) & (np.abs(next_b) <= tight), 1, 2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        on_a = np.where(crosses, a_in_b / (a_in_b - next_a), 0.0)
-        on_b = np.where(crosses, np.swapaxes(b_in_a / (b_in_a - next_b), 1, 2), 0.0)
+        on_a = np.where(crosses, a.inside / (a.inside - next_a), 0.0)
+        on_b = np.where(crosses, np.swapaxes(b.inside / (b.inside - next_b), 1, 2), 0.0)
     # What crosses at a corner that counts already is that corner.
-    for on, lengths, counts, axis in ((on_a, long[0][:, :, None], used[0], 1), (on_b, long[1][:, None], used[1], 2)):
+    for on, lengths, counts, axis in ((on_a, a.lengths[:, :, None], a.used, 1), (on_b, b.lengths[:, None], b.used, 2)):
         at_start, at_end = np.expand_dims(counts, 3 - axis), np.expand_dims(np.roll(counts, -1, axis=1), 3 - axis)
         crosses &= ~(at_start & (on * lengths <= 2.0 * tight)) & ~(at_end & ((1.0 - on) * lengths <= 2.0 * tight))
     return crosses, on_a, on_b
 
 
-def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(n, n_points, n_edges) array [m]: how far points are to the left of edges that start at corners."""
-    offset_to = points[:, :, None] - corners[:, None]
-    direction = directions[:, None]
-    return direction[..., 0] * offset_to[..., 1] - direction[..., 1] * offset_to[..., 0]
-
-
 def _on_face(
-    placed: PlacedParts,
-    end: np.ndarray,
-    alone: np.ndarray,
-    points: np.ndarray,
-    inside: np.ndarray,
-    corner: np.ndarray,
-    face: np.ndarray,
-    edge: np.ndarray,
+    placed: PlacedParts, end: np.ndarray, a: _Outlines, b: _Outlines, face: np.ndarray, alone: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Owners, features and points of corners on faces, with the edges that cross where they are on the boundary."""
+    """Owners, features and points of corners alone on faces, with the edges that cross where on their boundary."""
     solids = placed.solids
     pair, p = np.nonzero(alone)
-    depths = inside[pair, p]
-    own, other = corner[pair, p], edge[pair, depths.argmin(axis=1)]
+    depths = a.inside[pair, p]
+    own, other = a.corner[pair, p], b.edge[pair, depths.argmin(axis=1)]
     along = unit(placed.along(other))
     candidates = np.stack([own, solids.previous_corner[own]], axis=1)
     crossing = cross(unit(placed.along(candidates)), along[:, None])
     sine = np.sqrt(dot(crossing, crossing))
-    steepest = sine.argmax(axis=1)
-    row = np.arange(len(own))
-    crossed, at = candidates[row, steepest], placed.starts(own)
-    on_boundary = (depths.min(axis=1) <= end[pair, 0]) & (sine[row, steepest] >= SMALLEST_SINE)
+    (steepest, crossed), at = at_largest(sine, candidates), placed.starts(own)
+    on_boundary = (depths.min(axis=1) <= end[pair, 0]) & (steepest >= SMALLEST_SINE)
     on_boundary &= (placed.kinds_at(other, at) == ENDS) & (placed.kinds_at(crossed, at) == ENDS)
     code = np.where(on_boundary, other * np.int64(len(solids.corners)) + crossed, -1)
-    return pair, feature_rows(ON_FACE, solids.corners[own], face[pair], code), points[pair, p]
+    return pair, feature_rows(ON_FACE, solids.corners[own], face[pair], code), a.points[pair, p]
 
 
 def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, ...]:
@@ -158,9 +141,7 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     order = np.lexsort((np.arctan2(arms[:, 1], arms[:, 0]), owner))
     present = number > 0
     following = next_vertices(np.append(0, np.cumsum(number[present])))
-    ring = arms[order]
-    after = ring[following]
-    triangle = (ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]) / 2.0
+    triangle = turn(arms[order], arms[order[following]]) / 2.0
     # Half of the triangle before and half of the one behind.
     shares = sum(np.bincount(corner, triangle / 2.0, len(owner)) for corner in (order, order[following]))
     area = np.bincount(owner, shares, minlength=count)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import count
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import qr
@@ -17,9 +16,6 @@ from .contacts import frames_of
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike, linked
 from .solids import ROUNDING, Faces, Solids, cross, dot, taken, unit
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 #: An edge is re-entrant where the outward normals of its faces turn against each other by more than this sine.
 REENTRANT = 1e-4
@@ -64,8 +60,9 @@ class ConvexParts(Kept):
 
     solids: Solids  #: the parts
     block_of_part: np.ndarray  #: (n_parts,) int, ascending
+    widths: np.ndarray  #: (n_blocks,) [m]
     source: np.ndarray  #: (n_corners, 4) int: four corners of the block from which each corner of the parts follows
-    weights: np.ndarray  #: (n_corners, 4): with these weights
+    weights: np.ndarray  #: (n_corners, 3): with these parts of the ways from the first to the others
     inner: np.ndarray  #: (n_faces,) bool: faces of the parts inside their block, where it was cut
     plane: np.ndarray  #: (n_faces,) int: the same for faces into which one face of a block was cut
     pieces: np.ndarray  #: (n_corners, n_pieces, 3): of each edge from corner to corner of the block: first, last, kind
@@ -85,9 +82,9 @@ class ConvexParts(Kept):
         """Put the parts where the corners of their blocks now are, (n_vertices, 3) [m]."""
         if self.whole:
             return PlacedParts(self, vertices)
-        first = vertices[self.source[:, 0]]
-        others = (vertices[self.source[:, k]] - first for k in (1, 2, 3))
-        return PlacedParts(self, first + sum(self.weights[:, k + 1, None] * arm for k, arm in enumerate(others)))
+        first, *others = (vertices[corner] for corner in self.source.T)
+        ways = (weight[:, None] * (other - first) for weight, other in zip(self.weights.T, others, strict=True))
+        return PlacedParts(self, first + sum(ways))
 
 
 @dataclass(frozen=True)
@@ -151,10 +148,10 @@ def convex_parts(solids: Solids) -> ConvexParts:
     """
     bent = _out_of_faces(solids) > DRAWN_GAP * solids.widths
     if not bent.any():
-        none, n_faces, ends = np.zeros((0, 4)), len(solids.block_of_face), np.array([0.0, 1.0, ENDS])
+        none, n_faces, ends = np.zeros((0, 4), dtype=np.int64), len(solids.block_of_face), np.array([0.0, 1.0, ENDS])
         of_faces = np.zeros(n_faces, dtype=bool), np.arange(n_faces), np.tile(ends, (len(solids.corners), 1, 1))
-        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, *of_faces)
-    surfaces, sources, weights, block_of_part, drawn_faces = [], [], [], [], []
+        return ConvexParts(solids, np.arange(len(solids)), solids.widths, none, np.zeros((0, 3)), *of_faces)
+    found, drawn_faces = [], []
     pieces: list[np.ndarray] = []
     for block in range(len(solids)):
         own, loops = solids.surface(block)
@@ -170,15 +167,15 @@ def convex_parts(solids: Solids) -> ConvexParts:
         for corners, around, faces in parts:
             drawn_faces += [(block, number) for number, _ in faces]
             pieces += [of_edges for _, of_edges in faces]
-            surfaces.append((corners, around))
-            block_of_part.append(block)
             arms = np.linalg.solve((own[frame[1:]] - own[frame[0]]).T, (corners - own[frame[0]]).T).T
-            sources.append(np.tile(int(solids.offsets[block]) + frame, (len(corners), 1)))
-            weights.append(np.column_stack([1.0 - arms.sum(axis=1), arms]))
+            source = np.tile(int(solids.offsets[block]) + frame, (len(corners), 1))
+            found.append((block, (corners, around), source, arms))
+    block_of_part, surfaces, sources, weights = zip(*found, strict=True)
     drawn_face, n = np.array(drawn_faces), max(k.shape[1] for k in pieces)
     return ConvexParts(
         Solids.of_surfaces(surfaces),
         np.array(block_of_part),
+        solids.widths,
         np.concatenate(sources),
         np.concatenate(weights),
         drawn_face[:, 1] < 0,
@@ -234,11 +231,15 @@ class _Piece:
 
     def separated(self, normal: np.ndarray, origin: np.ndarray) -> list[_Piece]:
         """Cut along a plane, and tell apart the bodies in which that leaves the piece."""
+        # Loaded where it is used: most blocks are convex.
+        from manifold3d import Manifold, Mesh64
+
         # Corners in the plane are so to the last digit; cuts run beside it, or faces there would stay with both sides.
         frame = frames_of(normal[None])[0]
         level = (self.points - origin) @ frame.T
         level[np.abs(level[:, 0]) <= ON_PLANE, 0] = 0.0
-        body, found, cut = _body(level, self.triangles), [], int(self.face.max()) + 1
+        numbers, found, cut = np.arange(len(self.triangles), dtype=np.uint64), [], int(self.face.max()) + 1
+        body = Manifold(Mesh64(level, self.triangles.astype(np.uint64), face_id=numbers))
         sides = (body.trim_by_plane((sense, 0.0, 0.0), BESIDE_PLANE) for sense in (1.0, -1.0))
         for part in (part for side in sides for part in side.decompose()):
             if part.volume() > SMALLEST_PART:
@@ -249,13 +250,6 @@ class _Piece:
                 points, triangles = mesh.vert_properties @ frame + origin, mesh.tri_verts.astype(np.int64)
                 found.append(_Piece(points, triangles, face))
         return found
-
-
-def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
-    # Loaded where it is used: most blocks are convex.
-    from manifold3d import Manifold, Mesh64
-
-    return Manifold(Mesh64(points, triangles.astype(np.uint64), face_id=np.arange(len(triangles), dtype=np.uint64)))
 
 
 @lru_cache(maxsize=MOST_KEPT)
@@ -276,7 +270,10 @@ def _parts_of(
         if cut is not None:
             queue += piece.separated(*cut)
         else:
-            corners, rings, volume = _hull(_drawn_corners(piece.corners, drawn.vertices), flatness)
+            # Corners of the block as they were drawn, and of several at one place the first.
+            known = np.vstack([drawn.vertices, piece.corners])
+            same = np.abs(piece.corners[:, None] - known).max(axis=2) <= 2.0 * ON_PLANE
+            corners, rings, volume = _hull(known[same.argmax(axis=1)], flatness)
             total += volume
             drawn_in = [_drawn_face(corners[ring], whole, number, edges, flatness) for ring in rings]
             drawn_in = [(k if k >= 0 else -next(inside), pieces) for k, pieces in drawn_in]
@@ -329,9 +326,8 @@ def _crossing(piece: _Piece) -> np.ndarray | None:
         k = np.flatnonzero((before * after < 0.0) & (np.minimum(np.abs(before), np.abs(after)) > ON_CORNER))
         k = k[~np.isin(edges[k], own).any(axis=1)]
         at = start[k] + (before[k] / (before[k] - after[k]))[:, None] * (end[k] - start[k])
-        inside = np.all(
-            [cross((q - p)[None], at - p) @ normal > -ON_CORNER for p, q in ((a, b), (b, c), (c, a))], axis=0
-        )
+        around = ((a, b), (b, c), (c, a))
+        inside = np.all([cross((q - p)[None], at - p) @ normal > -ON_CORNER for p, q in around], axis=0)
         if inside.any():
             return np.asarray(at[inside][0])
     return None
@@ -400,12 +396,6 @@ def _hull(points: np.ndarray, flatness: float) -> tuple[np.ndarray, list[list[in
         mesh = body.to_mesh64()
         triangles = mesh.tri_verts.astype(np.int64)
         return *merged_faces((mesh.vert_properties, triangles.tolist()), flatness), body.volume()
-
-
-def _drawn_corners(corners: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """(n, 3) array: corners of a part, those of the block as they were drawn, and of several at one place the first."""
-    known = np.vstack([drawn, corners])
-    return known[(np.abs(corners[:, None] - known).max(axis=2) <= 2.0 * ON_PLANE).argmax(axis=1)]
 
 
 def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray, np.ndarray] | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from .broad_phase import expand_ranges
 from .convex_parts import PlacedParts
-from .portions import alike
+from .portions import alike, at_largest
 from .solids import ROUNDING, cross, dot, unit
 
 #: How much an overlap before the movement, along an axis, counts against one after it.
@@ -96,8 +96,7 @@ def _of_faces(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     first = np.empty(len(i), dtype=np.int64)
     for k, face, corner in alike((solids.faces_of_block, i), (solids.offsets, j), filled=True):
         gaps = [placed.before_faces(face, corner) for placed in movement]
-        best, row = _score(*gaps).argmax(axis=1), np.arange(len(k))
-        first[k], before[k], after[k] = face[row, best], gaps[0][row, best], gaps[1][row, best]
+        _, first[k], before[k], after[k] = at_largest(_score(*gaps), face, *gaps)
     return _Axes(first, first, before, after)
 
 
@@ -112,9 +111,8 @@ def _of_edges(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
         normals = across(placed_before, own, other)
         gaps, foremost = _gaps(placed_before, normals, own, other, corners)
         ridden, _ = _gaps(placed_after, _ridden(movement, normals, other), own, other, corners)
-        best, row = np.where(foremost, _score(gaps, ridden), -np.inf).argmax(axis=1), np.arange(len(k))
-        before[k] = np.where(foremost[row, best], gaps[row, best], -np.inf)
-        first[k], second[k], after[k] = own[row, best], other[row, best], ridden[row, best]
+        gaps = np.where(foremost, gaps, -np.inf)
+        _, first[k], second[k], before[k], after[k] = at_largest(_score(gaps, ridden), own, other, gaps, ridden)
     return _Axes(first, second, before, after)
 
 

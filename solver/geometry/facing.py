@@ -10,7 +10,7 @@ import numpy as np
 
 from .broad_phase import box_pairs, expand_ranges
 from .convex_parts import PlacedParts
-from .portions import alike
+from .portions import alike, at_largest
 from .solids import ROUNDING, cross, dot, taken, unit
 
 #: Edges nearer to parallel than this sine have no common normal: they are clipped against each other.
@@ -75,10 +75,7 @@ def face_separations(placed: PlacedParts, i: np.ndarray, j: np.ndarray) -> tuple
     for k, face, vertex in alike((solids.faces_of_block, i), (solids.offsets, j), filled=True):
         distance = placed.before_faces(face, vertex)
         behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
-        distance = np.where(inner[face], -np.inf, distance)
-        farthest = distance.argmax(axis=1)
-        row = np.arange(len(k))
-        apart[k], leading[k] = distance[row, farthest], face[row, farthest]
+        apart[k], leading[k] = at_largest(np.where(inner[face], -np.inf, distance), face)
     return apart, behind, leading
 
 
@@ -108,33 +105,27 @@ def edge_separations(
                 inward = sense * cross(taken(normals, solids.face_of_corner[of_face]), along)
                 separates &= side * dot(np.expand_dims(inward, axis), normal) >= -ROUNDING
         distance = np.where(separates, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
-        farthest = distance.argmax(axis=1)
-        row = np.arange(len(k))
-        apart[k] = distance[row, farthest]
-        edge_i[k], edge_j[k] = own[row, farthest // other.shape[1]], other[row, farthest % other.shape[1]]
+        pairs = np.repeat(own, other.shape[1], axis=1), np.tile(other, (1, own.shape[1]))
+        apart[k], edge_i[k], edge_j[k] = at_largest(distance, *pairs)
     return apart, edge_i, edge_j
 
 
-def near_parts(
-    placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def near_parts(placed: PlacedParts, reach: float, useful: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of parts of two blocks, one useful, the lower first, whose boxes are within reach; the thinner's width."""
-    block_of_part = placed.parts.block_of_part
+    block_of_part, widths = placed.parts.block_of_part, placed.parts.widths
     i, j = box_pairs(placed.vertices, placed.solids.offsets, reach)
     a, b = block_of_part[i], block_of_part[j]
     chosen = (a != b) & (useful[a] | useful[b])
     return i[chosen], j[chosen], np.minimum(widths[a], widths[b])[chosen]
 
 
-def overlapping_parts(
-    placed: PlacedParts, tolerance: float, useful: np.ndarray, widths: np.ndarray
-) -> tuple[np.ndarray, ...]:
+def overlapping_parts(placed: PlacedParts, tolerance: float, useful: np.ndarray) -> tuple[np.ndarray, ...]:
     """Near parts, as of :func:`near_parts`, that overlap by more than a tolerance [m], and their depths, (n,) [m].
 
     Convex parts are separated by a face of one of them or by two edges across each other: the largest separation of
     these, negative, is the depth.
     """
-    i, j, width = near_parts(placed, -tolerance, useful, widths)
+    i, j, width = near_parts(placed, -tolerance, useful)
     apart = np.full(len(i), -np.inf)
     by_edges = partial(edge_separations, smallest_sine=ROUNDING)
     for of, kinds in ((face_separations, 2), (face_separations, 2), (by_edges, 1)):
@@ -149,17 +140,17 @@ def _opposed_faces(placed: PlacedParts, leading: np.ndarray, j: np.ndarray) -> n
     normals = placed.faces.normals
     opposed = np.empty(len(j), dtype=np.int64)
     for k, face in alike((placed.solids.faces_of_block, j), filled=True):
-        cosine = dot(normals[face], normals[leading[k]][:, None])
-        opposed[k] = face[np.arange(len(k)), np.where(placed.parts.inner[face], np.inf, cosine).argmin(axis=1)]
+        against = -dot(normals[face], normals[leading[k]][:, None])
+        _, opposed[k] = at_largest(np.where(placed.parts.inner[face], -np.inf, against), face)
     return opposed
 
 
-def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray) -> FacingParts:
+def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray) -> FacingParts:
     """Choose the faces of near parts that face each other, where no face separates them farther than ``reach`` [m].
 
-    One of two near parts must be of the useful blocks, (n_blocks,) bool array, which have widths (n_blocks,) [m].
+    One of two near parts must be of the useful blocks, (n_blocks,) bool array.
     """
-    i, j, width = near_parts(placed, reach, useful, widths)
+    i, j, width = near_parts(placed, reach, useful)
     of_i = list(face_separations(placed, i, j))
     near = np.flatnonzero(np.maximum(*of_i[:2]) <= reach)
     i, j, width, *of_i = (value[near] for value in (i, j, width, *of_i))

@@ -13,6 +13,11 @@ from .broad_phase import box_pairs, boxes, expand_ranges
 from .portions import alike
 
 
+def turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(...) array: cross products of vectors in the plane, (..., 2), positive where b points to the left of a."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def next_vertices(offsets: np.ndarray) -> np.ndarray:
     """(n_vertices,) int array: the vertex that follows each around its polygon; edge i runs from i to it."""
     following = np.arange(1, offsets[-1] + 1)
@@ -47,9 +52,8 @@ def polygon_integrals(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.nda
     # From the first corner of each, so that coordinates far from the origin (UTM) lose no digits.
     origin = vertices[starts]
     x = vertices - np.repeat(origin, np.diff(offsets), axis=0)
-    following = next_vertices(offsets)
-    y = x[following]
-    cross = x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]
+    y = x[next_vertices(offsets)]
+    cross = turn(x, y)
     areas = np.add.reduceat(cross, starts) / 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
         local = np.add.reduceat((x + y) * cross[:, None], starts) / (6.0 * areas[:, None])
@@ -79,8 +83,7 @@ def self_crossings(vertices: np.ndarray, offsets: np.ndarray) -> dict[int, tuple
 
 
 def _side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
-    u, v = q - p, r - p
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    return turn(q - p, r - p)
 
 
 def overlap_depths(
@@ -96,8 +99,8 @@ def overlap_depths(
     of their ends from the other edge).
     """
     i, j = box_pairs(vertices, offsets, -tolerance)
-    depth = np.maximum(_inside_depth(vertices, offsets, i, j), _inside_depth(vertices, offsets, j, i))
-    depth = np.maximum(depth, _crossing_depth(vertices, offsets, i, j))
+    of_points = _inside_depth(vertices, offsets, np.append(i, j), np.append(j, i)).reshape(2, -1)
+    depth = np.maximum(of_points.max(axis=0), _crossing_depth(vertices, offsets, i, j))
     deep = depth > tolerance
     return i[deep], j[deep], depth[deep]
 
@@ -109,8 +112,7 @@ def interior_points(vertices: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     inside = _signed_distance(centroids, n, vertices, offsets) > 0
     if inside.all():
         return centroids
-    following = next_vertices(offsets)
-    along = vertices[following] - vertices
+    along = vertices[next_vertices(offsets)] - vertices
     length = np.hypot(*along.T)
     owner = np.repeat(n, np.diff(offsets))
     # A fifth of the mean width inwards from the middle of the edge from which that leads deepest inside.
@@ -144,18 +146,15 @@ def _signed_distance(points: np.ndarray, block: np.ndarray, vertices: np.ndarray
 
 def _inside_depth(vertices: np.ndarray, offsets: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     """For each pair, how deep the deepest corner, edge middle or interior point of i lies inside j."""
-    following = next_vertices(offsets)
-    middles = (vertices + vertices[following]) / 2.0
-    inner = interior_points(vertices, offsets)
+    middles, inner = (vertices + vertices[next_vertices(offsets)]) / 2.0, interior_points(vertices, offsets)
     low, high = boxes(vertices, offsets)
     depth = np.zeros(len(i))
-    counts = np.diff(offsets)[i]
-    owner, position = expand_ranges(counts)
+    owner, position = expand_ranges(np.diff(offsets)[i])
     index = offsets[i][owner] + position
-    sets = ((vertices[index], owner), (middles[index], owner), (inner[i], np.arange(len(i))))
-    for points, pair in sets:
-        near = ((points >= low[j[pair]]) & (points <= high[j[pair]])).all(axis=1)
-        np.maximum.at(depth, pair[near], _signed_distance(points[near], j[pair[near]], vertices, offsets))
+    points = np.concatenate([vertices[index], middles[index], inner[i]])
+    pair = np.concatenate([owner, owner, np.arange(len(i))])
+    near = ((points >= low[j[pair]]) & (points <= high[j[pair]])).all(axis=1)
+    np.maximum.at(depth, pair[near], _signed_distance(points[near], j[pair[near]], vertices, offsets))
     return depth
 
 

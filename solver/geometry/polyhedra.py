@@ -56,7 +56,7 @@ class Polyhedra(Solids):
         """
         widths, placed = self.widths, self.parts.placed(vertices)
         parts, solids, block_of_part = placed.parts, placed.solids, placed.parts.block_of_part
-        pairs = facing_parts(placed, reach, useful, widths)
+        pairs = facing_parts(placed, reach, useful)
 
         def near(contacts: Contacts) -> np.ndarray:
             deepest = PENETRATION_FRACTION * np.minimum(widths[contacts.block_a], widths[contacts.block_b])
@@ -128,7 +128,7 @@ class Polyhedra(Solids):
         A depth is the smallest movement that separates their deepest two parts.
         """
         every = np.ones(len(self), dtype=bool)
-        i, j, _, of_parts = overlapping_parts(self.parts.placed(vertices), tolerance, every, self.widths)
+        i, j, _, of_parts = overlapping_parts(self.parts.placed(vertices), tolerance, every)
         blocks = self.parts.block_of_part[np.stack([i, j], axis=1)]
         pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)
         depth = np.zeros(len(pairs))
@@ -144,9 +144,9 @@ class Polyhedra(Solids):
         the plane that separated the two.
         """
         placed, placed_after = self.parts.placed(before), self.parts.placed(after)
-        i, j, width, _ = overlapping_parts(placed_after, tolerance, useful, self.widths)
-        found = entered((placed, placed_after), i, j, PENETRATION_FRACTION * width)
-        face_corner, face, own, other, pair, corner = found
+        i, j, width, _ = overlapping_parts(placed_after, tolerance, useful)
+        deepest = PENETRATION_FRACTION * width
+        face_corner, face, own, other, pair, corner = entered((placed, placed_after), i, j, deepest)
         on_face = _measured(placed, feature_rows(ON_FACE, face_corner, face, -1))
         crossings = places_of(*_crossings(placed_after, own, other))
         crossed = _measured(placed, feature_rows(ACROSS, own, other, crossings))

@@ -38,6 +38,12 @@ def alike(*groups: tuple[np.ndarray, np.ndarray], filled: bool = False) -> Itera
                 yield items, *members
 
 
+def at_largest(values: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:
+    """Find the largest value, (n, m), of each row, the first of equal ones, and what others have there, (n,) arrays."""
+    there = np.arange(len(values)), values.argmax(axis=1)
+    return [given[there] for given in (values, *others)]
+
+
 def linked(pairs: np.ndarray, n: int) -> np.ndarray:
     """(n,) int array: number of the group of each of n items that pairs of them, (2, n_pairs) int, link."""
     from scipy.sparse import coo_array

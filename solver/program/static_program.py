@@ -85,15 +85,15 @@ class StaticProgram:
         self.model, self.pose, self.contacts, self.faces = model, pose, contacts, faces
         self.friction, self.limits, self.price, self.senses, self.exact = friction, limits, price, senses, exact
         self.size, self.programs = model.dimension, 0
-        free, rows = np.repeat(model.assembly.free, model.n_dof), wrench_matrix(contacts, pose, model.length)
-        self.matrix = sp.csr_array(rows)[free]  # (n_rows, size n)
+        free, self.wrench = np.repeat(model.assembly.free, model.n_dof), wrench_matrix(contacts, pose, model.length)
+        self.matrix = sp.csr_array(self.wrench)[free]  # (n_rows, size n)
         self.least = limits.least[:, None] * np.eye(model.dimension)[0]
         self.dead = model.scaled_load_at(pose).ravel()[free] + self.matrix[:, :: self.size] @ limits.least
         live, live_size = model.scaled_live(pose)
         along = np.zeros(len(free)) if rate is None else np.where(free, 0.0, (rate / model.lengths).ravel())
         # Relative to the speed of the supports, as the check of a solution is absolute.
         speed = float(np.abs(along).max(initial=0.0)) or 1.0
-        self.live, self.work = live.ravel()[free], rows.T @ along / speed
+        self.live, self.work = live.ravel()[free], self.wrench.T @ along / speed
         self.unit = 1.0 / live_size if senses else model.force * model.length * speed
         self.carried = Admissible.of(friction, limits.cohesion, limits.beyond_least, self.size, faces)
 
@@ -220,11 +220,7 @@ class StaticProgram:
             if np.abs(load).max(initial=0.0) > ACCEPTED:
                 raise NotSolved("nothing touches the free blocks")
             return least
-        rows = ContactRows(
-            wrench_matrix(self.contacts, self.pose, self.model.length),
-            self.model.assembly.free,
-            self.model.assembly.centroids,
-        )
+        rows = ContactRows(self.wrench, self.model.assembly.free, self.model.assembly.centroids)
         # Only ratios of the compliance matter.
         rigid = np.isinf(self.limits.beyond_least)
         none, unit_reaction = np.zeros_like(least[able]), None if reaction is None else self.work.reshape(least.shape)

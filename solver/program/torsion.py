@@ -8,8 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver.assembly import Assembly
+from solver.geometry.broad_phase import expand_ranges
 from solver.geometry.contacts import Contacts
-from solver.geometry.outlines import polygon_integrals
+from solver.geometry.outlines import polygon_integrals, turn
 from solver.geometry.portions import alike, linked
 
 #: Laws of torsion of the faces between blocks in space.
@@ -94,22 +95,18 @@ class Faces:
 
 def _faces(contacts: Contacts, length: float) -> np.ndarray:
     """(n_contacts,) int array: number of the face of each contact point."""
-    n = len(contacts)
-    pairs, joint = contacts.joints()
-    order, starts = np.argsort(joint, kind="stable"), np.append(0, np.cumsum(np.bincount(joint)))
-    links = []
-    for _, of_joints in alike((starts, np.arange(len(pairs)))):
-        members = order[of_joints]
-        i, j = np.triu_indices(members.shape[1], 1)
-        one, other = members[:, i].ravel(), members[:, j].ravel()
-        normal = contacts.frames[one, 0]
-        distance = np.abs(((contacts.points[one] - contacts.points[other]) * normal).sum(axis=1))
-        # Either block may be the first of a contact point.
-        sign = np.where(contacts.block_a[one] == contacts.block_a[other], 1.0, -1.0)
-        normal_difference = np.linalg.norm(normal - sign[:, None] * contacts.frames[other, 0], axis=1)
-        same = (distance <= ONE_FACE * length) & (normal_difference <= ONE_FACE)
-        links.append(np.stack([one[same], other[same]]))
-    return linked(np.concatenate(links, axis=1), n)
+    n, (_, joint) = len(contacts), contacts.joints()
+    order, ends = np.argsort(joint, kind="stable"), np.cumsum(np.bincount(joint))
+    # Every point with each that follows in its joint.
+    first, position = expand_ranges(ends[joint[order]] - np.arange(1, n + 1))
+    one, other = order[first], order[first + 1 + position]
+    normal = contacts.frames[one, 0]
+    distance = np.abs(((contacts.points[one] - contacts.points[other]) * normal).sum(axis=1))
+    # Either block may be the first of a contact point.
+    sign = np.where(contacts.block_a[one] == contacts.block_a[other], 1.0, -1.0)
+    normal_difference = np.linalg.norm(normal - sign[:, None] * contacts.frames[other, 0], axis=1)
+    same = (distance <= ONE_FACE * length) & (normal_difference <= ONE_FACE)
+    return linked(np.stack([one[same], other[same]]), n)
 
 
 def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -130,7 +127,7 @@ def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
     size = np.linalg.norm(edge, axis=2)
     along = edge / np.where(size > 0.0, size, 1.0)[..., None]
     # Of the triangle from the centre to an edge at a height h: ∫ |x| dA = h / 6 (t √(t² + h²) + h² asinh (t / h)).
-    height = start[..., 0] * along[..., 1] - start[..., 1] * along[..., 0]
+    height = turn(start, along)
     mean = np.zeros(len(points))
     for corner, sign in ((end, 1.0), (start, -1.0)):
         t = (corner * along).sum(axis=2)

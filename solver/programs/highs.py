@@ -58,7 +58,6 @@ def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]
     lp.col_upper_ = np.full(columns, highspy.kHighsInf)
     lp.row_lower_, lp.row_upper_ = program.lower, program.upper
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    lp.a_matrix_.num_row_, lp.a_matrix_.num_col_ = rows, columns
     lp.a_matrix_.start_ = program.matrix.indptr
     lp.a_matrix_.index_ = program.matrix.indices
     lp.a_matrix_.value_ = program.matrix.data

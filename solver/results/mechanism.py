@@ -11,6 +11,7 @@ from solver.geometry.contacts import Contacts
 from solver.geometry.portions import linked
 from solver.kinematics import motion_size, relative_velocities
 from solver.tolerances import CLOSED, NOTICEABLE
+from solver.words import counted
 
 from .increment import Increment, at_rest, carries, slides
 
@@ -39,8 +40,7 @@ class Mechanism:
 
     def __str__(self) -> str:
         """Count the macro-blocks, and name the hinges, sliding and crushing joints."""
-        n = len(self.motions)
-        words = [f"{n} macro-block{'' if n == 1 else 's'}"]
+        words = [counted(len(self.motions), "macro-block")]
         for what, pairs in (("hinge", self.hinges), ("sliding", self.sliding), ("crushing", self.crushing)):
             if len(pairs) == 0:
                 continue
