@@ -41,8 +41,12 @@ class ContactRows:
         n = matrix.shape[1] // d
         rows = matrix.indices.reshape(n, d, 2 * dof)[:, 0].astype(np.int64)
         number = np.append(np.where(free, np.cumsum(free) - 1, -1), -1)
-        self.pairs = number[rows[:, [0, dof]] // dof]
-        self.n_dof, self.dof, self.blocks = dof * int(free.sum()), dof, matrix.data.reshape(n, d, 2 * dof)
+        pairs, blocks = number[rows[:, [0, dof]] // dof], matrix.data.reshape(n, d, 2, dof)
+        # Whose corner it is does not matter here; pairs that stay the same need no new order.
+        turned = pairs[:, 0] > pairs[:, 1]
+        self.pairs = np.where(turned[:, None], pairs[:, ::-1], pairs)
+        blocks = np.where(turned[:, None, None, None], blocks[:, :, ::-1], blocks)
+        self.n_dof, self.dof, self.blocks = dof * int(free.sum()), dof, blocks.reshape(n, d, 2 * dof)
         self._assemble()
 
     def _assemble(self) -> None:
