@@ -44,17 +44,17 @@ class Band:
         self.order = (order[:, None] * dof + np.arange(dof)).ravel()
         positions = np.append(np.argsort(order), -1)[pairs]
         self.shape = (len(order) * dof, width)
-        rows = (positions[:, :, None] * dof + np.arange(dof)).reshape(len(pairs), 2 * dof)
-        on_support = np.repeat(positions < 0, dof, axis=1)
-        i, j = rows[:, :, None], rows[:, None, :]
-        lower = (~on_support[:, :, None] & ~on_support[:, None, :] & (i >= j)).ravel()
-        self.kept = np.flatnonzero(lower)
-        self.entry = (j * self.shape[1] + i - j).ravel()[self.kept]
+        rows = np.where(positions[:, :, None] < 0, -1, positions[:, :, None] * dof + np.arange(dof))
+        rows = rows.reshape(len(pairs), 2 * dof)
+        i, j = (rows[:, of] for of in np.triu_indices(2 * dof))
+        first = np.minimum(i, j)
+        # What acts on supports is put behind the band.
+        self.entry = np.where(first < 0, len(order) * dof * width, first * width + np.abs(i - j)).ravel()
 
     def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """Factorise the sum of the pairs' matrices, (n, (2 dof)²), and a diagonal; gives what solves with it."""
+        """Factorise the sum of the pairs' matrices, lower triangles by columns, and a diagonal; what solves."""
         size, width = self.shape
-        band = np.bincount(self.entry, matrices.ravel()[self.kept], size * width).reshape(self.shape).T
+        band = np.bincount(self.entry, matrices.ravel(), size * width + 1)[:-1].reshape(self.shape).T
         band[0] += diagonal[self.order] + ALONE * band[0].max()
         factor, bad = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
         if bad:
@@ -119,6 +119,8 @@ class Fronts:
         front, every = np.repeat(np.arange(len(parts)), sizes), len(order)
         keys, shift = np.concatenate([k * every + blocks for k, blocks in enumerate(beyond)]), np.cumsum(m) - m
         entries, kept = [], []
+        upper, number = np.triu_indices(2 * dof), np.zeros((2 * dof, 2 * dof), dtype=np.int64)
+        number[upper] = number[upper[::-1]] = np.arange(len(upper[0]))
         for a, b in ((0, 0), (1, 1), (0, 1), (1, 0)):
             of = np.flatnonzero((rows.min(axis=1) >= 0) & (rows[:, a] > rows[:, b]) if a != b else rows[:, a] >= 0)
             i, j = rows[of, a], rows[of, b]
@@ -130,7 +132,7 @@ class Fronts:
             entries.append(
                 at[:, None, None] + axes[:, None] + ((j - first[k]) * dof)[:, None, None] * high + axes * high
             )
-            kept.append((of[:, None, None] * 2 * dof + a * dof + axes[:, None]) * 2 * dof + b * dof + axes)
+            kept.append(of[:, None, None] * len(upper[0]) + number[a * dof : (a + 1) * dof, b * dof : (b + 1) * dof])
         self.entry, self.kept = (np.concatenate([of.ravel() for of in all_of]) for all_of in (entries, kept))
 
     def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:

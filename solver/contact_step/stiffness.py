@@ -15,10 +15,12 @@ from solver.contact_step.factors import Band, Fronts, Solve, factorisation
 def _over_pairs(pairs: bytes) -> tuple[sp.csr_array, bytes]:
     """Give what sums over the points of each pair of blocks, and the pairs."""
     of_points = np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2)
-    some, pair = np.unique(of_points, axis=0, return_inverse=True)
     points = np.arange(len(of_points))
-    sums = sp.csr_array((np.ones(len(points)), (pair.ravel(), points)), shape=(len(some), len(points)))
-    return sums, some.tobytes()
+    # One number for each pair sorts faster than two.
+    keys = of_points @ [of_points.max(initial=0) + 2, 1]
+    _, first, pair = np.unique(keys, return_index=True, return_inverse=True)
+    sums = sp.csr_array((np.ones(len(points)), (pair, points)), shape=(len(first), len(points)))
+    return sums, of_points[first].tobytes()
 
 
 @lru_cache(maxsize=4)
@@ -41,8 +43,12 @@ class ContactRows:
         n = matrix.shape[1] // d
         rows = matrix.indices.reshape(n, d, 2 * dof)[:, 0].astype(np.int64)
         number = np.append(np.where(free, np.cumsum(free) - 1, -1), -1)
-        self.pairs = number[rows[:, [0, dof]] // dof]
-        self.n_dof, self.dof, self.blocks = dof * int(free.sum()), dof, matrix.data.reshape(n, d, 2 * dof)
+        pairs, blocks = number[rows[:, [0, dof]] // dof], matrix.data.reshape(n, d, 2, dof)
+        # Whose corner it is does not matter here; pairs that stay the same need no new order.
+        turned = pairs[:, 0] > pairs[:, 1]
+        self.pairs = np.where(turned[:, None], pairs[:, ::-1], pairs)
+        blocks = np.where(turned[:, None, None, None], blocks[:, :, ::-1], blocks)
+        self.n_dof, self.dof, self.blocks = dof * int(free.sum()), dof, blocks.reshape(n, d, 2 * dof)
         self._assemble()
 
     def _assemble(self) -> None:
@@ -53,8 +59,8 @@ class ContactRows:
         starts = np.arange(n * d + 1) * both
         self.matrix = sp.csr_array((self.blocks.ravel(), columns, starts), shape=(n * d, self.n_dof + 1))
         self.transposed = self.matrix.T
-        # Small products of arrays that do not lie in order take three times as long.
-        self.across = np.ascontiguousarray(self.blocks.transpose(0, 2, 1))
+        # Products of arrays with the points last, which lie in order, take a quarter of the time.
+        self.of_points = np.ascontiguousarray(self.blocks.transpose(1, 2, 0))
         self.key = self.pairs.astype(np.int64).tobytes()
 
     def __getitem__(self, chosen: np.ndarray) -> ContactRows:
@@ -74,8 +80,12 @@ class ContactRows:
 
     def factorised(self, stiffness: np.ndarray, diagonal: np.ndarray) -> Solve:
         """Factorise a stiffness (n, d, d) of the points and a diagonal (n_dof,): what solves; raises ``NotSolved``."""
-        weighted = np.matmul(stiffness, self.blocks)
+        rows, both, n = self.of_points, 2 * self.dof, len(stiffness)
+        weighted = np.einsum("ijn,jcn->icn", np.ascontiguousarray(stiffness.transpose(1, 2, 0)), rows)
+        # The lower triangle of each point's matrix, by columns.
+        each = np.empty((both * (both + 1) // 2, n))
+        for c, at in enumerate(np.cumsum(np.arange(both, 0, -1)) - np.arange(both, 0, -1)):
+            np.einsum("in,irn->rn", rows[:, c], weighted[:, c:], out=each[at : at + both - c])
         sums, pairs = _over_pairs(self.key)
         of_pairs = _factorisation(pairs, self.places, self.n_dof // self.dof, self.dof)
-        each = np.matmul(self.across, weighted)
-        return of_pairs.factorised(sums @ each.reshape(len(each), -1), diagonal)
+        return of_pairs.factorised(sums @ each.T, diagonal)
