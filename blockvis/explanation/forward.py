@@ -28,9 +28,9 @@ from solver import mechanics
 
 from .observations import Observations
 
-#: Increments up to the largest amount of a candidate, each longer than the one before by this factor: what an amount
-#: does is known within the same fraction of it, whatever cracks a movement opens.
-INCREMENTS, LONGER = 16, 1.35
+#: Times the step_tolerance of the case that steps aim for, and the most: widths are compared within a quarter of them,
+#: and of reactions nothing is told.
+COARSER, COARSEST = 8.0, 0.5
 
 #: A run stops where a joint is open by so many times the widest observed crack.
 ENOUGH = 2.0
@@ -76,11 +76,15 @@ class Order:
         return self.given.case.settlements[0]
 
 
+class OpenEnough(Exception):
+    """A joint is open so wide that nothing more is asked of a run."""
+
+
 @dataclass(frozen=True)
 class Run:
     """What a candidate does, for every amount."""
 
-    amounts: np.ndarray  #: (n,) array [m or rad]: of the increments in equilibrium, from 0, or 0 alone.
+    amounts: np.ndarray  #: (n,) array [m or rad]: of the steps of the path, from 0, or 0 alone.
     moved: np.ndarray  #: (n, n_blocks, n_dof) array [m and rad]: displacement and rotation of each block.
     fell: bool  #: Whether it ended in a collapse.
 
@@ -130,17 +134,15 @@ def ordered(case: Case, assembly: solver.Assembly, motions: Any, variant: Varian
     profile = by_bearing(moving, motions)
     lever = lever_of(moving, solver.Settlement(**profile))
     farthest = reach[0] / lever
-    stops = tuple(farthest / LONGER**k for k in range(1, INCREMENTS))
-    settlement = solver.Settlement(
-        **profile, increment=farthest, limit=farthest, stops=stops, tolerance=COLLAPSE * farthest
-    )
+    settlement = solver.Settlement(**profile, increment=farthest, limit=farthest, tolerance=COLLAPSE * farthest)
+    coarse = min(COARSER * case.controls.step_tolerance, COARSEST)
     friction = variant.friction
     factor = friction / case.friction_coefficient if case.friction_coefficient > 0.0 else 1.0
     varied = replace(
         Variation(friction_factor=factor).of(case),
         friction_coefficient=friction,
         settlements=(settlement,),
-        controls=replace(case.controls, falling_frames=0),
+        controls=replace(case.controls, falling_frames=0, step_tolerance=coarse),
     )
     loads = case_loads(case, moving)
     # In space towards the left and, half as much, the front: one that is alike about both axes has its paths, too.
@@ -155,25 +157,54 @@ def ordered(case: Case, assembly: solver.Assembly, motions: Any, variant: Varian
 
 def followed(order: Order) -> Run:
     """Carry out a run; one that cannot be solved ends where it came to."""
-    assembly = order.given.assembly
-    joints = initial_joints(assembly)
-    amounts, moved = [], []
-    steps = FOLLOWED.start(order.given, None, ()).steps
+    trace = _Trace(order)
+    steps = FOLLOWED.start(replace(order.given, listeners=[trace.step]), None, ()).steps
     fell = False
-    with suppress(solver.SolveError):
+    with suppress(solver.SolveError, OpenEnough):
         for increment in steps:
-            if increment.status != solver.Status.EQUILIBRIUM:
-                continue
-            amounts.append(increment.parameter)
-            moved.append(increment.pose.displacements(assembly))
-            moves = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
-            if moves[:, 0].max(initial=0.0) > order.enough:
-                steps.close()
-                break
-        else:
-            fell = steps.ending.collapse is not None
-    nothing = solver.Pose.initial(assembly).displacements(assembly)
-    return Run(np.array(amounts or [0.0]), np.array(moved or [nothing]), fell)
+            if increment.status == solver.Status.EQUILIBRIUM:
+                trace.add(increment.parameter, increment.pose.displacements(order.given.assembly))
+        fell = steps.ending.collapse is not None
+    return trace.run(fell)
+
+
+class _Trace:
+    """Where the steps of a run have led, and the increments that it reports: the start, and what ends it.
+
+    More increments would tell nothing else, and cost more than the steps between them: each has its proof.
+    """
+
+    def __init__(self, order: Order) -> None:
+        self.assembly, self.enough = order.given.assembly, order.enough
+        self.joints = initial_joints(self.assembly)
+        self.amounts: list[float] = []
+        self.moved: list[np.ndarray] = []
+
+    def add(self, amount: float, moved: np.ndarray) -> None:
+        """Add a place [m or rad], (n_blocks, n_dof) [m and rad]; those from there on are no more on the path."""
+        while self.amounts and self.amounts[-1] >= amount:
+            self.amounts.pop()
+            self.moved.pop()
+        self.amounts.append(amount)
+        self.moved.append(moved)
+
+    def step(self, state: mechanics.PathState) -> None:
+        """Hear of a step; raises :class:`OpenEnough` where nothing more is asked."""
+        place, begun = state.place, state.start
+        # Steps that are refused lead nowhere, and poses of a path may be about an origin of its own.
+        if self.amounts and place.s == self.amounts[-1]:
+            return
+        self.add(place.s, np.concatenate([place.pose.positions - begun.positions, place.pose.rotations], axis=1))
+        fallen = ~np.isnan(state.fell_at) if len(state.fell_at) else None
+        pose = pose_of(self.assembly, self.moved[-1])
+        opening = opening_and_slip(self.assembly, self.joints, pose, fallen)[:, 0]
+        if opening.max(initial=0.0) > self.enough:
+            raise OpenEnough
+
+    def run(self, fell: bool) -> Run:
+        """Return the run so far; nothing has moved where none of it was solved."""
+        at_rest = solver.Pose.initial(self.assembly).displacements(self.assembly)
+        return Run(np.array(self.amounts or [0.0]), np.array(self.moved or [at_rest]), fell)
 
 
 @contextmanager
