@@ -364,6 +364,38 @@ def test_stones_lean_to_a_side():
     np.testing.assert_allclose(orders[-1].given.loads.dead[:, 1] / orders[0].given.loads.dead[:, 1], 2.0 - ratio)
 
 
+def runs_of(folder, name, arch):
+    """An explanation of a crack in an arch, whose left springer has moved to the left."""
+    blockvis.save_layout(arch, folder / f"{name}.json")
+    (folder / f"{name}.toml").write_text(
+        f"[geometry]\nfile = '{name}.json'\n[material]\nfriction_coefficient = 0.6\n"
+        "[explain]\nsupports = ['left springer']\ndirections = ['left']\nfriction = [0.6, 0.6]\n",
+        encoding="utf-8",
+    )
+    return blockvis.explain(folder / f"{name}.toml", [{"joint": "voussoir 3 | voussoir 4", "width": 0.003}])
+
+
+def test_runs_are_known_at_all_amounts_up_to_where_joints_are_wide_open(tmp_path):
+    found = runs_of(tmp_path, "near", ARCH)
+    assert found.runs
+    for run in found.runs.values():
+        openings = found.comparison.openings(run.moved).max(axis=1)
+        assert openings[:-1].max() <= ENOUGH / 256 < openings[-1]
+        # Between two steps the pose is interpolated; each is twice as long as the one before, at most.
+        assert (np.diff(run.amounts)[1:] <= 2.001 * np.diff(run.amounts)[:-1]).all()
+        assert run.amounts[1] < 1e-3 * run.amounts[-1]
+        assert not run.fell
+
+
+def test_runs_on_a_national_grid_are_those_near_the_origin(tmp_path):
+    far = replace(ARCH, shapes=ARCH.shapes.shifted(np.array([4e5, 5e6])))
+    near, far = (list(runs_of(tmp_path, *given).runs.values()) for given in (("near", ARCH), ("far", far)))
+    assert len(near) == len(far) > 0
+    for one, other in zip(near, far, strict=True):
+        np.testing.assert_allclose(one.amounts, other.amounts, rtol=1e-3)
+        np.testing.assert_allclose(one.moved, other.moved, atol=1e-3 * np.abs(one.moved).max())
+
+
 @pytest.mark.slow
 def test_an_interrupt_does_not_wait_for_runs():
     futures = []
@@ -483,8 +515,8 @@ def test_cracks_of_causes_are_those_of_joints_with_mortar_or_that_give():
         case = structures.case_from(layout + law + "[settlement]\ndirection = [0, -1]\n")
         order = ordered(case, ARCH, one.motions, Variant(0.6, 0), (0.02, np.inf))
         given = order.given
-        short = 2.0 * min(order.settlement.stops)
-        first = replace(order.settlement, increment=short, limit=short, stops=())
+        short = order.settlement.limit / 45.0
+        first = replace(order.settlement, increment=short, limit=short)
         response = solver.settle(given.assembly, first, interfaces=given.interfaces, loads=given.loads)
         widest[name] = np.asarray(structures.posed(ARCH, response.path[-1].pose).joints(0).cell_data["opening"]).max()
     assert widest["soft"] < 0.5 * widest["dry"]
