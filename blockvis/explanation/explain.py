@@ -19,6 +19,7 @@ from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.kinds.kind import needs_no_crushing
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import refuse_files
+from blockvis.runs.once_more import takes_steps
 from blockvis.runs.plan import refuse_ties
 from blockvis.runs.progress import RunsProgress
 from blockvis.text import place_text
@@ -177,7 +178,7 @@ def _notes_of_frame(comparison: Comparison) -> list[str]:
 
 
 def _refuse_unknown(case: Case) -> None:
-    """Raise ValueError for what happens between two settlements, and for ties from the ground.
+    """Raise ValueError for what happens between two settlements, paths without steps, and ties from the ground.
 
     One movement of supports against each other is followed, from the drawing on.
     """
@@ -185,6 +186,11 @@ def _refuse_unknown(case: Case) -> None:
         raise ValueError(
             f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
             "drawn; leave it out, and such blocks out of the drawing"
+        )
+    if not takes_steps(case):
+        raise ValueError(
+            f'{case.source}: [analysis] increments is "{case.controls.increments}", which has no steps between two '
+            "increments, and blockvis explain follows these; leave it out"
         )
     for tie in case.ties:
         if tie.phase > 1:

@@ -535,6 +535,14 @@ def test_more_friction_takes_the_tension_that_the_joints_then_cannot_have():
         assert (law.friction_coefficient, law.tensile_strength) == pytest.approx((0.75, 1e4 / 0.75))
 
 
+def test_increments_without_steps_are_refused(tmp_path):
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[analysis]\nincrements = "linear program"\n', encoding="utf-8"
+    )
+    with pytest.raises(ValueError, match=r'increments is "linear program", which has no steps .*; leave it out'):
+        blockvis.explain(tmp_path / "case.toml", [{"joint": "voussoir 3 | voussoir 4", "width": 0.003}])
+
+
 def test_supports_that_all_move_as_one_are_refused_before_anything_is_followed(tmp_path):
     settings = '[explain]\nsupports = [["left springer", "right springer"]]\ndirections = ["down", "left"]\n'
     layout = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n'
