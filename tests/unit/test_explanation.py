@@ -387,6 +387,7 @@ def test_runs_are_known_at_all_amounts_up_to_where_joints_are_wide_open(tmp_path
         assert not run.fell
 
 
+@pytest.mark.thorough
 def test_runs_on_a_national_grid_are_those_near_the_origin(tmp_path):
     far = replace(ARCH, shapes=ARCH.shapes.shifted(np.array([4e5, 5e6])))
     near, far = (list(runs_of(tmp_path, *given).runs.values()) for given in (("near", ARCH), ("far", far)))
