@@ -24,7 +24,7 @@ from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
 from .reports import Reports, no_equilibrium
 from .state import EquilibriumCheck, PathState, Place
-from .stepping import CARRIES, Stepper
+from .stepping import CARRIES, StepError, Stepper
 
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.05, 1e-11
@@ -383,18 +383,11 @@ class Path:
         part = 1.0 / 3.0 if error.penetration > CLOSING_GAP else self.stepper.members.part_to_strength(place, new)
         if part < 1.0 and length > FIRST_STEP * unit:
             return replace(state, step=part * length), None
-        deep, pressed, load = error.penetration > CLOSING_GAP, new.forces[:, 0].max(initial=0.0), self.model.total_load
-        if (deep or pressed > 100.0 * load) and self._supports_locked(place):
-            return state, self.reports.locked(new)
-        if deep and pressed > 10.0 * load:
-            return state, self.reports.locked(new, "; as drawn they have no room: make their faces plane, or trim them")
+        locked = self._locked(place, new, error.penetration > CLOSING_GAP)
+        if locked is not None:
+            return state, locked
         works = self._works(place, new, motion)
-        # Beside the work of the supports or the live load, unless that is next to nothing, or so beside the others.
-        driven = max(abs(works[1] + works[2]), self.tolerance * sum(map(abs, works)), CARRIES * length / unit)
-        of_friction = error.work / driven / self.tolerance
-        if length <= AT_ONCE * min(FRICTION_MEMORY * unit, place.s):
-            of_friction = min(of_friction, 1.0)
-        measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
+        measure = self._error(place, length, error, works)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length / 4.0), None
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
@@ -419,6 +412,25 @@ class Path:
             until = max(state.refine_until, s + ENCLOSED * self.driver.tolerance)
             state = replace(state, upper_bound=np.inf, refine_until=until)
         return state, None
+
+    def _locked(self, place: Place, new: Place, deep: bool) -> Ending | None:
+        """The ending where supports are locked, or blocks that come deep into each other have no room."""
+        pressed, load = new.forces[:, 0].max(initial=0.0), self.model.total_load
+        if (deep or pressed > 100.0 * load) and self._supports_locked(place):
+            return self.reports.locked(new)
+        if deep and pressed > 10.0 * load:
+            return self.reports.locked(new, "; as drawn they have no room: make their faces plane, or trim them")
+        return None
+
+    def _error(self, place: Place, length: float, error: StepError, works: tuple[float, ...]) -> float:
+        """The error of a step from a place, in errors aimed for."""
+        unit = self.stepper.unit
+        # Beside the work of the supports or the live load, unless that is next to nothing, or so beside the others.
+        driven = max(abs(works[1] + works[2]), self.tolerance * sum(map(abs, works)), CARRIES * length / unit)
+        of_friction = error.work / driven / self.tolerance
+        if length <= AT_ONCE * min(FRICTION_MEMORY * unit, place.s):
+            of_friction = min(of_friction, 1.0)
+        return max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
 
     def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Ending | None]:
         """Shorten a step that was not solved, or end where it is the shortest."""
