@@ -253,13 +253,7 @@ class Settlement:
             raise ValueError(
                 "a settlement with a profile has its supports and motions; give no direction, centre or blocks"
             )
-        given = (self.profile or {}).items()
-        motions = {name: numbers_of(motion, f"settlement profile of '{name}'") for name, motion in given}
-        shapes = [motion.shape for motion in motions.values()]
-        for name, motion in motions.items():
-            if motion.shape not in ((3,), (6,)) or motion.shape != shapes[0] or not np.isfinite(motion).all():
-                wanted = "[dx, dy, rotation], in space [dx, dy, dz, rx, ry, rz]"
-                raise ValueError(f"settlement profile of '{name}' is {motion.tolist()}; give {wanted}")
+        motions = self._profile_motions()
         table = np.abs(list(motions.values())).reshape(len(motions), -1 if motions else 3)
         d = dimension_of(table.shape[1])
         travel, turn = (np.hypot.reduce(part, axis=1) for part in (table[:, :d], table[:, d:]))
@@ -278,6 +272,17 @@ class Settlement:
             if name not in scaled or arm.shape != (d,) or not np.isfinite(arm).all():
                 raise ValueError(f"profile_arms of '{name}' are {arm.tolist()}; give {d} numbers, of a moving support")
         object.__setattr__(self, "profile_arms", {name: tuple(arm.tolist()) for name, arm in arms.items()} or None)
+
+    def _profile_motions(self) -> dict[str, np.ndarray]:
+        """Read the motion of each support in the profile, (3,) or (6,) alike; raises ``ValueError`` otherwise."""
+        given = (self.profile or {}).items()
+        motions = {name: numbers_of(motion, f"settlement profile of '{name}'") for name, motion in given}
+        shapes = [motion.shape for motion in motions.values()]
+        for name, motion in motions.items():
+            if motion.shape not in ((3,), (6,)) or motion.shape != shapes[0] or not np.isfinite(motion).all():
+                wanted = "[dx, dy, rotation], in space [dx, dy, dz, rx, ry, rz]"
+                raise ValueError(f"settlement profile of '{name}' is {motion.tolist()}; give {wanted}")
+        return motions
 
     @property
     def unit(self) -> str:
