@@ -101,8 +101,8 @@ class StaticProgram:
         """Bound the reaction or the multiplier of all equilibria within friction.
 
         In space the forces of the least one prove that there is an equilibrium; where they do not, and in the plane,
-        where programs without a solution take long, first the least sum of unbalanced forces. The least reaction is that of
-        Portioli & Cascini (2017) at this geometry.
+        where programs without a solution take long, first the least sum of unbalanced forces. The least reaction is
+        that of Portioli & Cascini (2017) at this geometry.
         """
         least = self._least_in_balance() if self.size > 2 else None
         balanced, unbalanced = self.most_balanced() if least is None else (least, 0.0)
@@ -126,7 +126,7 @@ class StaticProgram:
         return EquilibriumBounds(unbalanced, values[1.0], values[-1.0], gap, forces)
 
     def _least_in_balance(self) -> ProgramState | None:
-        """The state of the least value; None where there is none, or its forces are out of balance by more than rounding."""
+        """Find the state of the least value; None where its forces are out of balance by more than rounding."""
         try:
             least = self.bound(1.0)
         except (Unbounded, SolveError):
