@@ -78,6 +78,7 @@ class StepError:
     """Measures of the error of a step: the work in units of the program, all else in block sizes."""
 
     work: float  #: of friction by which bounds at the end of the step were not what was expected
+    taken: float  #: work of friction, and of members, by the forces at the end of the step
     turn: float  #: change of the movement against that of the steps before
     moved: float  #: movement of the fastest block
     penetration: float  #: deepest at a contact point that carries
@@ -317,7 +318,11 @@ class Stepper:
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((movement - before) * self._shares)
         penetration = self._penetration(points, new)
-        return new, motion / model.lengths, StepError(work, turn, movement_size, penetration, is_linearised)
+        return (
+            new,
+            motion / model.lengths,
+            StepError(work, self._taken(points, new), turn, movement_size, penetration, is_linearised),
+        )
 
     def gives(self, place: Place) -> bool:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""
@@ -478,6 +483,14 @@ class Stepper:
         # once; of the rest, half, as bounds depart in the course of the step, and half of that cancels.
         one_sided = 0.0 if self.model.has_live else abs(float(works.sum()))
         return (1.0 + size / memory) ** 3 * max(0.25 * float(np.abs(works).sum()), one_sided)
+
+    def _taken(self, points: _StepPoints, new: Place) -> float:
+        """Work of friction, and of members, by the forces at the end of a step."""
+        assert new.contacts is not None
+        slipped = (new.contacts.slip - points.start.slip) / self.model.length
+        closed = (new.contacts.gaps - points.start.gaps) / self.model.length
+        of_members = (new.forces[:, 0] * closed)[is_member(points.start)]
+        return -float((new.forces[:, 1:] * slipped).sum() + of_members.sum())
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
