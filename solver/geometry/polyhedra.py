@@ -105,7 +105,7 @@ class Polyhedra(Solids):
         beside, resting = shallow & others, np.flatnonzero(shallow & ~others)
         beside[resting] = _rests_on_more(placed, pairs[resting])
         over, crossed = _edges_over(placed, pairs[beside], reach)[0], _crossed_edges(placed, pairs[others], reach)
-        single = _measured(placed, np.vstack([over, crossed]))
+        single = _measured(placed, np.unique(np.vstack([over, crossed]), axis=0))
         beyond = [placed.kinds_at(edge, single.points) != ENDS for edge in single.features.T[1:3]]
         single = single[near(single) & ~((single.features[:, 0] == ACROSS) & np.any(beyond, axis=0))]
         contacts = joined_contacts([*found, single])
@@ -320,7 +320,7 @@ def _edges_over(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[
     own, other = edge[owner[crosses]], corner[crosses]
     meets = feature_rows(ACROSS, own, other, places_of(*_crossings(placed, own, other)))
     on_cut = np.bincount(pair, along_face & np.logical_or.reduceat(goes_on, starts), minlength=len(pairs.part)) > 0
-    return np.unique(np.concatenate([stands, meets]), axis=0), on_cut
+    return np.concatenate([stands, meets]), on_cut
 
 
 def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
