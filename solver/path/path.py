@@ -386,7 +386,7 @@ class Path:
         locked = self._locked(place, new, error.penetration > CLOSING_GAP)
         if locked is not None:
             return state, locked
-        works = self._works(new, motion, error.taken)
+        works = (*self._works(new, motion), error.taken)
         measure = self._error(place, length, error, works)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length / 4.0), None
@@ -495,8 +495,8 @@ class Path:
         """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""
         return not self.model.has_live and bool(np.isneginf(self.checks.bounds(place).low))
 
-    def _works(self, after: Place, motion: np.ndarray, taken: float) -> tuple[float, float, float, float]:
-        """Works of dead and live loads, on supports and, as taken, of friction in a step, by the forces at its end."""
+    def _works(self, after: Place, motion: np.ndarray) -> tuple[float, float, float]:
+        """Works of dead and live loads and on supports in a step, with the forces at its end."""
         model = self.model
         live, live_size = model.scaled_live(after.pose)
         free = model.assembly.free[:, None]
@@ -504,7 +504,6 @@ class Path:
             float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
             self._work_on_supports(after, motion),
-            taken,
         )
 
     def _work_on_supports(self, place: Place, motion: np.ndarray) -> float:

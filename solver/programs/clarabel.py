@@ -43,7 +43,9 @@ def run_clarabel(program: ConicProgram, route: str) -> tuple[Solution | None, st
     rows_of_dual = sp.csc_matrix((program.matrix @ sp.diags_array(scale)).T)
     zero = sp.csc_matrix((rows, rows))
     solver = clarabel.DefaultSolver(zero, -program.right, rows_of_dual, scale * program.cost, cones, settings)
-    solver.set_termination_callback(_is_near)
+    solver.set_termination_callback(
+        lambda at: at.res_dual <= BALANCE and at.res_primal <= MOTION and min(at.gap_abs, at.gap_rel) <= TOLERANCE
+    )
     solution = solver.solve()
     x, y = scale * np.asarray(solution.z), np.asarray(solution.x)
     status = str(solution.status)
@@ -55,7 +57,3 @@ def run_clarabel(program: ConicProgram, route: str) -> tuple[Solution | None, st
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
         return None, status
     return program.checked(x, y, route, int(solution.iterations)), status
-
-
-def _is_near(at: clarabel.DefaultInfo) -> bool:
-    return at.res_dual <= BALANCE and at.res_primal <= MOTION and min(at.gap_abs, at.gap_rel) <= TOLERANCE
