@@ -37,7 +37,6 @@ from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import FlatScene
 from blockvis.pictures.frame import Frame, framed
-from blockvis.pictures.live_load import dead_load_of
 from blockvis.pictures.swing import swing_of
 from solver import mechanics
 
@@ -195,14 +194,13 @@ def test_dead_loads_beside_the_weight_have_arrows_where_they_act(tmp_path, acts)
     case += f'[[loads]]\nblocks = "lintel"\n{acts}\n' if acts else ""
     (tmp_path / "case.toml").write_text(case, encoding="utf-8")
     response = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=()).response
-    load = dead_load_of(response, response.path[-1], 3.0)
-    lintel = response.assembly.names.index("lintel")
-    assert load.blocks.tolist() == ([lintel] if acts else [])
-    pushed = 1000.0 if "force" in acts else 0.1 * response.assembly.masses[lintel] * solver.loads.GRAVITY
-    assert load.forces == pytest.approx(np.array([[0.0, -pushed]] * bool(acts)).reshape(-1, 2))
-    assert load.points == pytest.approx(response.path[-1].pose.positions[load.blocks], abs=1e-9)
-    drawn = alike(pixels(draw_still(response, -1, tmp_path / "still.png", size=SMALL)), palette.LOADS["dead"], 30)
-    assert (drawn.sum() > 40) == bool(acts)
+    picture = pixels(draw_still(response, -1, tmp_path / "still.png", size=(1280, 720), forces="none"))
+    arrow = np.argwhere(alike(picture, palette.LOADS["dead"], 30)[:576])
+    assert (len(arrow) > 20) == bool(acts)
+    if acts:
+        # Upright over the middle of the lintel, which is that of the picture.
+        assert np.ptp(arrow[:, 0]) > 3 * np.ptp(arrow[:, 1])
+        assert arrow[:, 1].mean() == pytest.approx(640.0, abs=3.0)
 
 
 def test_bent_blocks_are_filled_without_triangle_lines():
