@@ -217,7 +217,7 @@ def animate(
 def _mechanism_note(response: solver.Response, n: int) -> str:
     bodies = f"{mechanics.counted(n, 'moving part')}{', darker where faster' if n > MOST_PARTS else ''}"
     if response.collapse is None:
-        if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
+        if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM or (response.limits and not response.path):
             when = f"before any {response.parameter.name}" if response.measured.is_force else "under the dead load"
             return f"no equilibrium {when}   ·   {bodies}"
         if response.limits:

@@ -309,6 +309,16 @@ def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, words):
     assert '"live_words":""' not in report
 
 
+def test_what_does_not_stand_before_its_limit_load_is_told_as_that(tmp_path, words):
+    solids = [box((-1, -1, -0.4), (1, 1, 0)), box((0.9, -0.2, 0), (1.3, 0.2, 1))]
+    leaning = solver.Assembly.from_solids(solids, roles=["fixed", "free"])
+    push = solver.Loads(solver.self_weight(leaning).dead, solver.weight_fraction(leaning, (0.0, 1.0, 0.0)))
+    response = solver.limit_load(leaning, loads=push, friction_coefficient=0.9).response
+    draw_mechanism(response, tmp_path / "a.png", size=SMALL)
+    assert "no equilibrium under the dead load" in str(words[0])
+    assert [key.text for key in words[0]["keys"]][-1] == "as drawn"
+
+
 def test_mechanism_shows_parts_and_motion(tmp_path):
     picture = pixels(draw_mechanism(arch_response(), tmp_path / "mechanism.png", size=(1280, 720)))
     body = picture[100:600]
