@@ -1,4 +1,6 @@
-"""Run tests file by file, each file in a process of its own: ``python tools/tests_by_file.py "MARKERS" [SECONDS]``.
+"""Run tests file by file, each file in a process of its own: ``python tools/tests_by_file.py "MARKERS"``.
+
+``FOLDER=MARKERS`` after it says which tests of a folder run instead.
 
 What takes long or starts other programs runs here: a process that crashes or hangs is then named with the file it ran
 and with the stacks of its threads, and costs that file alone. Where pytest's own workers share the files out, one that
@@ -18,12 +20,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 #: Seconds that one file may take; the longest takes about 300 on two quiet cores, 850 on two slow and busy ones.
 PATIENCE = 1500
 
-#: Folders whose files take longest come first, so that no long one is left for the end.
+#: Folders whose files take longest come first, and in each those of most tests: no long one is left for the end.
 FOLDERS = ("tests/regression", "tests/system", "tests/validation", "tests")
 
 #: What pytest ends with where no test is left.
@@ -31,13 +34,14 @@ NOTHING = 5
 
 
 def files(markers: str) -> list[str]:
-    """Find the files with tests that the markers select, those of the long folders first."""
+    """Find the files with tests that the markers select, those that may take long first."""
     command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", markers, *FOLDERS]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
     if done.returncode:
         sys.exit(f"{done.stdout}\nthe tests of '{markers}' could not be collected (exit code {done.returncode})")
-    found = re.findall(r"^(\S+\.py)::", done.stdout, re.MULTILINE)
-    return sorted(set(found), key=lambda file: next(i for i, folder in enumerate(FOLDERS) if file.startswith(folder)))
+    found = Counter(re.findall(r"^(\S+\.py)::", done.stdout, re.MULTILINE))
+    folder = {file: next(i for i, folder in enumerate(FOLDERS) if file.startswith(folder)) for file in found}
+    return sorted(found, key=lambda file: (folder[file], -found[file], file))
 
 
 def once(file: str, markers: str, seconds: float) -> tuple[int, str]:
@@ -81,15 +85,16 @@ def run(file: str, markers: str, seconds: float) -> bool:
     return False
 
 
-def main(markers: str, seconds: float = PATIENCE) -> int:
-    """Run what the markers select on all cores; return the exit code, 0 where all passed."""
+def main(markers: str, instead: dict[str, str]) -> int:
+    """Run what the markers select on all cores, in some folders others; return the exit code, 0 where all passed."""
     selected = files(markers)
+    chosen = [instead.get(os.path.dirname(file), markers) for file in selected]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        passed = list(pool.map(lambda file: run(file, markers, seconds), selected))
+        passed = list(pool.map(lambda file, markers: run(file, markers, PATIENCE), selected, chosen))
     failed = [file for file, good in zip(selected, passed, strict=True) if not good]
     print(f"{len(selected)} files, {len(failed)} failed" + "".join(f"\n  {file}" for file in failed))
     return bool(failed)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], *map(float, sys.argv[2:])))
+    sys.exit(main(sys.argv[1], dict(argument.split("=") for argument in sys.argv[2:])))
