@@ -65,6 +65,7 @@ def test_a_mask_becomes_a_run_that_ends_in_a_curve_over_its_photograph(tmp_path,
     assert within[1] < 0.01
 
 
+@pytest.mark.thorough
 def test_a_photograph_of_another_shape_or_place_goes_under_nothing(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     drawn_wall()[0].save("wall.png")
@@ -492,7 +493,7 @@ def test_charts_and_shaded_drawings_are_refused_unless_their_specks_are_said(tmp
     assert (layout.n_blocks, len(layout.left_out)) == (1, 1)
 
 
-@pytest.mark.parametrize("sill", [240, 180])
+@pytest.mark.parametrize("sill", [pytest.param(240, marks=pytest.mark.thorough), 180])
 def test_of_a_drawing_of_lines_the_largest_regions_may_be_openings(tmp_path, sill):
     image = Image.new("L", (340, 260), 255)
     draw = ImageDraw.Draw(image)

@@ -100,6 +100,7 @@ def test_info_convert_and_a_case_take_them(tmp_path, capsys):
         assert assembly_of(read_case(tmp_path / "case.toml")).names == ("stone 1", "stone 2", "stone 3")
 
 
+@pytest.mark.thorough
 def test_a_run_knows_when_one_of_its_files_changes(tmp_path):
     folder = stones(tmp_path / "stones", n=3)
 

@@ -49,10 +49,11 @@ def test_named_objects_may_touch(tmp_path):
 @pytest.mark.parametrize(
     ("name", "up", "says"),
     [
-        (
+        pytest.param(
             "two-leaf wall",
             "y",
             r"2 bodies stand on a level if y is up, none would if z is: .* as \(x, -z, y\); .*\"xz\"",
+            marks=pytest.mark.thorough,
         ),
         ("barrel vault", "y", r"2 bodies stand on a level if y is up, 14 would if z is: .*view = \"xz\" if z is up"),
         ("barrel vault", "z", r"writes coordinates as they are, z up in most files: z was .*view = \"xy\" if y is up"),
@@ -91,7 +92,7 @@ def test_where_blocks_stand_along_y_that_is_told_of_files_that_do_not_say_what_i
         assert not any("is up" in note for note in read_layout(path, dimension=3).notes)
 
 
-@pytest.mark.parametrize("suffix", ["stl", "ply"])
+@pytest.mark.parametrize("suffix", ["stl", pytest.param("ply", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize(
     "name", ["T corner", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("dome", "cross vault"))]
 )

@@ -141,6 +141,7 @@ def test_shapes_of_an_svg_are_left_out_by_kind_and_colour(tmp_path, capsys):
     assert "names           c\n" in info(capsys, tmp_path / "wall.svg", "--ignore", "#ffcc00")
 
 
+@pytest.mark.thorough
 def test_overlaps_name_the_smallest_set_to_leave_out_having_tried_it(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bricks = [brick(x, y) for x in range(4) for y in (0, 0.5)]

@@ -17,6 +17,7 @@ def test_nothing_is_contradicted(kind):
     )
 
 
+@pytest.mark.thorough
 def test_three_blocks_at_a_corner():
     """Here a reaction was once 6 % of the weight too small."""
     assert tried("voronoi", 1049).wrong == []
@@ -54,6 +55,7 @@ def test_a_trial_is_made_from_its_kind_and_seed_alone():
     assert (one.friction, one.settlement) == (other.friction, other.settlement)
 
 
+@pytest.mark.thorough
 def test_joints_without_friction_have_nothing_to_stick_by():
     """Here steps grew shorter without end, as points that carry no shear force came to stick and to slide in turns."""
     finding = tried("layout", 30024)

@@ -98,6 +98,7 @@ def test_limit_load_of_a_block_from_its_case_file(tmp_path, capsys):
     assert main(["render", str(folder), "--animation", "none"]) == 0
 
 
+@pytest.mark.thorough
 def test_flow_without_dilatancy_reaches_the_solver(tmp_path):
     text = COLUMN + '[analysis]\nkind = "limit load"\nflow = "non-associative"\n' + SIDEWAYS
     response, summary = solved(text, tmp_path)
@@ -513,6 +514,7 @@ def test_pushover_after_a_tilt_starts_at_what_is_left(tmp_path):
     assert "nothing is left to push over" in summary["message"]
 
 
+@pytest.mark.thorough
 def test_a_pushover_says_which_settlement_it_comes_after(tmp_path):
     """Neither its curve nor its table tells that the capacity is not that of the drawing."""
     tilt = '[roles]\n"ground" = "moving"\n[settlement]\nrotation_centre = [0.0, 0.0]\nrotation = -1.0\nlimit = 0.01\n'

@@ -83,6 +83,7 @@ def test_read_only_folder(case, tmp_path, capsys):
     assert "Read-only file system; choose another folder with -o" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_a_folder_whose_name_is_not_utf_8(case, tmp_path):
     """As old archives and shares have them."""
     folder = tmp_path / os.fsdecode(b"caf\xe9")
@@ -109,6 +110,7 @@ def test_what_could_not_be_written_is_named(case, tmp_path, capsys, monkeypatch)
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_a_folder_that_is_moved_during_the_run_is_not_made_again(case, tmp_path, monkeypatch):
     """Made again it held half of the run, which could be neither opened nor resumed."""
     folders = sys.modules[blockvis.run_case.__module__].ResultsFolder

@@ -406,6 +406,7 @@ def test_keys_of_the_case_are_checked(folder, tmp_path, capsys, change, words):
     assert f"[explain] {words.split(' ')[0]}" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_a_structure_that_does_not_stand_has_no_cause(folder, tmp_path, capsys):
     slippery = CASE.replace("friction = [0.7, 0.7]", "friction = [0.01, 0.01]").replace("= 0.7\n", "= 0.01\n")
     (tmp_path / "case.toml").write_text(slippery, encoding="utf-8")

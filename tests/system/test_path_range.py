@@ -144,6 +144,7 @@ def test_the_reaction_ranges_over_the_runs_that_get_there():
     assert reaction.runs.tolist() == [2, 2, 2, 2, 2, 1]
 
 
+@pytest.mark.thorough
 def test_the_band_of_a_later_phase_lies_behind_those_before():
     arch = blockvis.generators.arch(voussoirs=6, thickness_ratio=0.2)
     phases = [solver.Settlement(direction=d, increment=0.05, limit=0.05) for d in ((1, 0), (0, -1))]
@@ -162,6 +163,7 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     assert '"band":[]' in report_of(response)
 
 
+@pytest.mark.thorough
 def test_words_of_a_collapse_lie_where_other_runs_leave_room():
     """Their band has no height, and goes on to three times the settlement of the collapse."""
     reaction = np.full(2, 2000.0)

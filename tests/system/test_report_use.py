@@ -67,6 +67,7 @@ def told(page, tmp_path, script, *options, anchor=""):
     return found
 
 
+@pytest.mark.thorough
 def test_title_names_case_file_date_and_version(tmp_path):
     text = (
         '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.05\n'

@@ -49,6 +49,7 @@ def test_a_series_shows_each_increment_at_its_settlement(arch_folder, tmp_path):
     shows_each_increment(arch_response(), converted(arch_folder, tmp_path / "arch.vtkhdf"))
 
 
+@pytest.mark.thorough
 def test_a_series_is_named_where_no_other_file_is_written_or_read(arch_folder, tmp_path, capsys):
     assert main(["convert", str(arch_folder), str(tmp_path / "a.nothing")]) == 2
     assert main(["convert", str(converted(arch_folder, tmp_path / "a.vtkhdf")), str(tmp_path / "a.dxf")]) == 2
@@ -111,6 +112,7 @@ def test_an_animation_in_space_has_y_upwards(tmp_path):
     np.testing.assert_allclose(last, [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]], atol=1e-3)
 
 
+@pytest.mark.thorough
 def test_what_never_stood_swings_out(tmp_path):
     """The crown of an arch that is too thin goes down."""
     thin = solver.settle(
@@ -163,6 +165,7 @@ def test_blocks_taken_away_are_left_out_of_layouts_and_vanish_from_animations(in
     assert played(film, 3.1)[1][1, 1] == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.thorough
 def test_the_deformed_layout_is_told_in_the_unit_of_its_settlement(tmp_path, capsys):
     converted(blockvis.write(moved_and_turned(), tmp_path / "out"), tmp_path / "deformed.json")
     assert capsys.readouterr().out.endswith(", as they are at settlement 0.001 rad in phase 2\n")
@@ -181,6 +184,7 @@ def test_an_animation_of_a_load_that_moves_begins_at_0_seconds(tmp_path):
     assert {tuple(one["min"]) for one in times} == {(0.0,)}
 
 
+@pytest.mark.thorough
 def test_a_block_called_as_the_scene_moves_alone(tmp_path):
     outlines = [rectangle(-1.0, -1.0, 1.0, 0.0), rectangle(-1.0, 0.0, 0.0, 1.0), rectangle(0.0, 0.0, 1.0, 1.0)]
     assembly = solver.Assembly.from_outlines(outlines, names=["ground", "a", "world"], roles=["moving", "free", "free"])

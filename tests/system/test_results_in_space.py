@@ -470,6 +470,7 @@ def test_supports_reach_down_to_the_ground_of_a_fall_which_has_no_end(tmp_path):
         assert np.abs(np.diff(picture[:, :40], axis=0)).max() < 12, "the ground has no edge"
 
 
+@pytest.mark.thorough
 def test_corners_of_a_still_lie_in_shade(tmp_path):
     """Where two faces meet at a hollow corner both are darker than away from it."""
     step = [box((0, 0, 0), (4, 4, 1)), box((0, 2, 1), (4, 4, 3))]

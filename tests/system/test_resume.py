@@ -429,6 +429,7 @@ def test_a_response_keeps_no_checkpoints():
     assert all(i.checkpoint is None for i in solver.settle(arch, spread).increments)
 
 
+@pytest.mark.thorough
 def test_an_increment_that_takes_longer_than_it_may_is_told_and_goes_on_bit_for_bit(tmp_path, capsys):
     case = tmp_path / "case.toml"
     text = '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.01\nlimit = 0.02\n'

@@ -138,6 +138,7 @@ def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
     assert not (tmp_path / "out" / "step_check.json").exists()
 
 
+@pytest.mark.thorough
 def test_linear_programs_take_no_steps_that_could_be_compared(tmp_path, capsys):
     text = SHORT + '\n[analysis]\nincrements = "linear program"\n'
     assert not takes_steps(case_from(text, tmp_path))

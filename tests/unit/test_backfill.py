@@ -258,6 +258,7 @@ def test_a_weight_fraction_is_one_of_the_fill_over_its_blocks_too(tmp_path: Path
     assert response.limits[0].live_force == pytest.approx(0.5 * weights[third].sum())
 
 
+@pytest.mark.thorough
 def test_a_weight_fraction_that_begins_with_a_settlement_is_one_of_the_fill(tmp_path: Path) -> None:
     phases = f"[[settlement]]{MOVED}{SHORT}[[settlement]]{MOVED}{SHORT}"
     later = "[[loads]]\nweight_fraction = [0.01, 0.0]\nphase = 2\n"

@@ -83,6 +83,7 @@ def test_each_bond_fills_the_wall_and_stands_over_a_door_and_two_windows(bond):
     assert first_status(layout) is solver.Status.EQUILIBRIUM
 
 
+@pytest.mark.thorough
 @pytest.mark.path
 @pytest.mark.parametrize("heads", [pytest.param("lintel", marks=pytest.mark.thorough), "flat arch", "arch"])
 def test_other_heads_stand_too(heads):
@@ -124,6 +125,7 @@ def test_other_heads_than_those_that_are_asked_for_are_told():
     assert note.startswith(f"{said}a shallower one, or one with less bearing")
 
 
+@pytest.mark.thorough
 def test_without_heads_stones_of_a_stack_bond_fall_out_over_an_opening():
     layout = generators.bond(WALL, OPENINGS[:1], bond="stack", brick=(0.4, 0.2), heads="none")
     assert first_status(layout, friction=0.3) is not solver.Status.EQUILIBRIUM
@@ -230,7 +232,9 @@ def test_mortar_is_left_open_between_stones_and_not_along_the_rim():
     assert shapely.union_all(shapes_of(layout)).bounds == pytest.approx(WALL.bounds)
 
 
-@pytest.mark.parametrize(("bond", "heads"), [("ashlar", "auto"), ("flemish", "arch")])
+@pytest.mark.parametrize(
+    ("bond", "heads"), [("ashlar", "auto"), pytest.param("flemish", "arch", marks=pytest.mark.thorough)]
+)
 def test_mortar_is_left_open_between_stones_and_voussoirs(bond, heads):
     # A round head, whose voussoirs have oblique faces that no stone beside them meets to the last digit.
     turn = np.linspace(0.0, np.pi, 25)
@@ -246,6 +250,7 @@ def test_mortar_is_left_open_between_stones_and_voussoirs(bond, heads):
     assert min(shapes[i].distance(shapes[j]) for i, j in pairs if i < j) > 0.7 * 0.008
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("bond", "heads"), [("running", "auto"), ("flemish", "arch")])
 def test_stones_far_from_the_origin_have_no_corner_twice(bond, heads):
     window = arched(1.5, 0.8, 1.0, 0.8, 0.5)
@@ -357,6 +362,7 @@ def test_a_case_fills_the_wall_and_closes_its_joints(facade):
     assert {"lintel 1", "ground"} <= set(assembly.names)
 
 
+@pytest.mark.thorough
 def test_a_gap_between_stones_of_a_bond_is_no_joint_and_one_between_drawn_stones_is(tmp_path):
     window = arched(0.8, 0.4, 1.2, 0.9, 0.6, n=8)
     pier = [("pier", shapely.box(6, low, 6.5, low + 0.5)) for low in (0.0, 0.51)]

@@ -164,6 +164,7 @@ def test_stones_that_overlap_are_refused_with_the_place(tmp_path):
     assert faced.vertices[:8, 2].max() == pytest.approx(0.95)
 
 
+@pytest.mark.thorough
 def test_a_small_overlap_that_facing_leaves_is_a_contact_with_a_note(tmp_path):
     (points, faces), low = box((0, 0, 0.995), (1, 1, 2)), box((0, 0, 0), (1, 1, 1))
     # Too steep for a joint of two faces: it touches along an edge, 5 mm too deep.
@@ -212,6 +213,7 @@ def test_new_writes_a_case_in_space(tmp_path, capsys):
     ).any()
 
 
+@pytest.mark.thorough
 def test_new_names_the_supports_of_a_drawing(tmp_path):
     save_layout(generators.dome(lunes=4, courses=1), tmp_path / "dome.stl")
     assert main(["new", str(tmp_path / "dome.stl"), "-o", str(tmp_path / "dome.toml")], outputs=()) == 0

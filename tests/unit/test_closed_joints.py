@@ -355,6 +355,7 @@ def test_neighbours_share_their_edges_to_the_last_digit(seed):
     assert sum(map(len, closed)) < 15 * len(closed)
 
 
+@pytest.mark.thorough
 def test_stones_end_where_an_uneven_ground_begins():
     x = np.linspace(-0.1, WIDTH + 0.1, 60)
     top = np.column_stack([x, 0.012 * np.sin(25.0 * x) - 0.012])
@@ -712,6 +713,7 @@ def deepest(solids):
     return assembly.shapes.overlaps(assembly.vertices, 1e-9)[2].max(initial=0.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("tolerance", [None, pytest.param(0.1, marks=pytest.mark.thorough)])
 def test_facing_never_makes_the_deepest_overlap_deeper(tolerance):
     drawn = generators.build("barrel vault", SMALL["barrel vault"])

@@ -67,6 +67,7 @@ def test_the_curve_names_the_failure_of_a_run(tmp_path):
     assert not any("failed" in line for line in said(response, tmp_path / "whole.svg"))
 
 
+@pytest.mark.thorough
 def test_names_of_case_and_ties_are_text_whatever_they_hold_and_long_ones_are_broken(tmp_path):
     """No formula between two "$", also in the legend where it begins with "_"; a long one hid where the lines are."""
     name = "tie in the middle of the northern arcade, 24 mm across, installed in 1897"
@@ -107,6 +108,7 @@ def test_ticks_are_plain_numbers(tmp_path):
     assert not [line for line in told if re.search(r"\de[+−-]?\d|10\^|×|mathdefault", line)], told
 
 
+@pytest.mark.thorough
 def test_a_curve_of_many_increments_is_a_line_without_dots(tmp_path):
     """Dots stand at few increments; no list of hinges over the plot, however often they change."""
     few, many = (parted(wall(4, 3), n, 0) for n in (10, 60))
@@ -139,6 +141,7 @@ def test_an_envelope_is_drawn_and_written_as_a_response(tmp_path):
     assert envelope.response.governing.parameter == 0.9
 
 
+@pytest.mark.thorough
 def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_path):
     response = parted(wall(4, 3), 4, 0)
     rest, *others = response.path

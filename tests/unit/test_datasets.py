@@ -92,6 +92,7 @@ def times_in(out):
     return list(pv.PVDReader(out / "blocks.pvd").time_values)
 
 
+@pytest.mark.thorough
 def test_the_collection_ends_with_the_last_equilibrium_at_its_settlement(tmp_path):
     response = arch_response()
     out = blockvis.write(response, tmp_path / "a & b")

@@ -94,6 +94,7 @@ def test_a_support_turns_about_the_middle_of_where_it_carries():
 VAULT = generators.cross_vault(span=4.0, rise=1.5, thickness=0.3, voussoirs=5, stone=1.4)
 
 
+@pytest.mark.thorough
 def test_supports_in_space_sink_spread_and_tilt_and_are_said_where_they_go():
     ground, found = candidates(VAULT)
     causes = {one.cause: one for one in found}

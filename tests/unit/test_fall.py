@@ -531,6 +531,7 @@ def test_a_tie_that_yields_stops_a_block_by_its_work():
     assert engine.rest[0] - 4.0 == pytest.approx(0.5, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_a_block_on_a_stiff_tie_swings_at_its_length_and_energy_only_falls():
     """Half a period of the pendulum takes it to the other side: 0.59 of that of small swings longer at 90°."""
     engine = hung(tie_of(((3.0, 5.0), (0.0, 5.0)), stiffness=1e9), 3.0)
@@ -545,6 +546,7 @@ def test_a_block_on_a_stiff_tie_swings_at_its_length_and_energy_only_falls():
     assert max(places) > 5.0
 
 
+@pytest.mark.thorough
 def test_what_a_soft_tie_has_stored_comes_back_and_no_more():
     """A block that falls into a tie of 0.1 m give by its weight, 1 m below where it is taut."""
     engine = hung(tie_of(((0.0, 8.0), (0.0, 6.0)), stiffness=10.0 * WEIGHT), 3.0, at=(0.0, 6.0))

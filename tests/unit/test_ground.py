@@ -218,6 +218,7 @@ TOED = (
 )
 
 
+@pytest.mark.thorough
 def test_the_ground_does_not_close_over_a_toe(tmp_path, capsys):
     """A tongue over it would hold the stone down: the least reaction was -0.295 W."""
     drawing = drawn(tmp_path / "wall.json", TOED)

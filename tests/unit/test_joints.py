@@ -224,6 +224,7 @@ def test_the_last_equilibrium_before_a_phase_that_falls_at_once_keeps_the_units_
         assert grid["falls"].any()
 
 
+@pytest.mark.thorough
 def test_files_have_the_place_of_a_load_that_moves(tmp_path):
     (tmp_path / "case.toml").write_text(
         '[geometry]\nlayout = "arch"\n[analysis]\nkind = "limit load"\n'
@@ -260,6 +261,7 @@ def test_a_case_chooses_the_undeformed_shape_and_files_that_meshio_reads(tmp_pat
         blockvis.read_case(tmp_path / "case.toml")
 
 
+@pytest.mark.thorough
 def test_meshio_gives_polyhedra_their_own_data(tmp_path):
     """It puts polyhedra together by their numbers of corners, and their data by the order of these numbers."""
     l_shaped = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], dtype=float)
@@ -301,6 +303,7 @@ def test_joints_csv_names_the_widest_crack_first(arch_folder):
     assert openings[3] == 0.0, "what a step leaves is no opening"
 
 
+@pytest.mark.thorough
 def test_joints_csv_has_no_opening_of_a_joint_that_is_pressed_together(tmp_path):
     outlines = [[[0, y], [1, y], [1, y + 1], [0, y + 1]] for y in range(3)]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free", "free"])
@@ -371,6 +374,7 @@ def test_joints_of_a_stone_that_is_lost_open_no_more(tmp_path):
         assert float(row["settlement at largest slip [m]"]) <= lost
 
 
+@pytest.mark.thorough
 def test_a_joint_that_slips_far_stands_behind_those_that_are_open_also_of_reopened_results(tmp_path):
     out = blockvis.write(parted(wall(6, 4), 6, 2), tmp_path / "out")
     again = blockvis.write(blockvis.open_results(out), tmp_path / "again")

@@ -337,6 +337,7 @@ def test_rounding_of_a_reaction_is_none_and_unknown_bounds_make_no_linear_progra
     assert kind.summary(unknown)["increments_by"] == "coulomb"
 
 
+@pytest.mark.thorough
 def test_supports_that_carry_nothing_are_told():
     said = "no free block touches the supports that move: nothing follows them"
     assert said not in KINDS["settlement"].lines(lifted_brick())

@@ -199,6 +199,7 @@ def test_a_legend_has_no_gaps_and_what_stays_keeps_its_place():
     assert same - beside == pytest.approx(hinge - lost, abs=1), "as near as if nothing had been between"
 
 
+@pytest.mark.thorough
 def test_the_first_entry_of_a_legend_does_not_stand_alone_and_the_others_stay_as_it_comes_and_goes():
     colours = [(25 * k, 200, 0) for k in range(9)]
     keys = [drawing.Key("area", "an entry of it", colour) for colour in colours]
@@ -495,6 +496,7 @@ def test_a_mechanism_has_one_unit_of_length(words, tmp_path):
     assert f"equilibrium at {low:.5g} mm, none at {high:.5g} mm" in told["detail"]
 
 
+@pytest.mark.thorough
 def test_the_mechanism_of_what_falls_as_a_stone_is_taken_away_names_stone_and_phase(words, tmp_path):
     structure = solver.Structure(generators.build("arch", {"voussoirs": 5}), friction_coefficient=0.8)
     phase = solver.Settlement([1.0, 0.0], increment=1e-3, limit=1e-3)

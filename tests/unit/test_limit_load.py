@@ -81,6 +81,7 @@ def test_without_dilatancy_a_block_on_a_slope_carries_any_weight_below_its_angle
         assert limit.multiplier == np.inf
 
 
+@pytest.mark.thorough
 def test_without_dilatancy_a_wall_has_the_limit_load_of_its_mirror_image_and_of_any_order_of_its_blocks():
     # Many forces carry alike: of two corners on one stone either may press.
     rows, found = [[0.0, 1.0, 2.0], [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, 2.0]], []

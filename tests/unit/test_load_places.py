@@ -51,6 +51,7 @@ def test_a_point_far_outside_the_one_block_that_is_named_is_told():
         loads_of('blocks = "brick 4-2"\npoint = [0.3, 50]')
 
 
+@pytest.mark.thorough
 def test_axles_move_together_and_are_told_by_the_first(tmp_path):
     """A block that overhangs its ground, and tips about x = 0 as its weight says, 0.25 m behind that edge."""
     blocks = [
@@ -127,6 +128,7 @@ def test_a_force_on_many_blocks_is_told_with_its_sum():
     np.testing.assert_allclose(loads[:, :2].sum(axis=0), [0.0, -9000.0])
 
 
+@pytest.mark.thorough
 def test_notes_of_reopened_results_name_the_file_of_the_case(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(force="[0, -500]", more=""), encoding="utf-8")

@@ -140,6 +140,7 @@ def test_a_tie_goes_with_the_block_that_it_ends_on() -> None:
     assert np.isnan(response.path[-1].ties.elongations).all()
 
 
+@pytest.mark.thorough
 def test_a_phase_that_changes_nothing_begins_with_the_equilibrium_at_the_end_of_the_one_before() -> None:
     # One long increment: viscosity retards joints that close, and what is reported has come to rest.
     phase = solver.Settlement([-0.75, 0.67], increment=0.02, limit=0.02)
@@ -208,6 +209,7 @@ def test_a_load_acts_from_its_phase_on() -> None:
     assert sums == pytest.approx([weight_above(structure)] * 2 + [weight_above(structure) + 1000.0] * 2, rel=1e-8)
 
 
+@pytest.mark.thorough
 def test_a_load_elsewhere_leaves_the_forces_of_joints_as_they_are() -> None:
     arch = build("arch")
     x = float(arch.vertices[:, 0].max()) + 5.0
@@ -226,6 +228,7 @@ def test_a_load_elsewhere_leaves_the_forces_of_joints_as_they_are() -> None:
     assert thrusts[2] == pytest.approx(thrusts[1], rel=1e-4)
 
 
+@pytest.mark.thorough
 def test_springs_have_moved_before_a_settlement_begins() -> None:
     footing, on_it = rectangle(0.0, 0.0, 1.5, 0.5), rectangle(0.3, 0.5, 0.8, 2.5)
     assembly = solver.Assembly.from_outlines(
@@ -524,6 +527,7 @@ def test_a_tie_that_is_named_twice_is_taken_away_once(tmp_path: Path, capsys: py
     assert curve.read_text(encoding="utf-8").count("'iron' taken away") == 1
 
 
+@pytest.mark.thorough
 def test_a_block_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     column = (
         '[geometry]\nlayout = "column"\nparameters = { blocks = 4, width = 0.6, block_height = 0.5, depth = 0.5 }\n'
@@ -555,6 +559,7 @@ def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     assert main(["report", str(tmp_path / "out")]) == 0
 
 
+@pytest.mark.thorough
 def test_a_folder_is_reopened_after_a_tie_has_been_taken_away(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

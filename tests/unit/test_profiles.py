@@ -136,6 +136,7 @@ def test_points_are_joined_by_straight_lines_and_level_beyond():
     np.testing.assert_allclose(table.value(np.array([-1.0, 0.5, 3.0])), [0.0, 0.25, 1.0])
 
 
+@pytest.mark.thorough
 def test_each_support_of_a_case_goes_by_the_trough_at_its_centroid(tmp_path):
     case = case_of(PORTAL, '{ kind = "gaussian", centre = 0.0, inflection = 1.0 }')
     with pytest.warns(UserWarning, match="'ground right' into 3 pieces"):
@@ -343,6 +344,7 @@ def tops(assembly, settlement, s):
     return found
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore:the ground follows")
 def test_how_wide_the_ground_is_drawn_counts_for_nothing(tmp_path):
     found = []
@@ -372,6 +374,7 @@ def test_a_straight_profile_along_x_strains_the_ground(tmp_path):
         assert "ground" in assembly.names
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore:the ground follows")
 def test_pieces_turn_about_the_centroid_of_what_was_drawn_as_one(tmp_path):
     text = drawn(tmp_path, {"ground": (0.0, 4.0)})

@@ -155,6 +155,7 @@ def test_mirror_image(name):
     assert_same(name, CASES[name].mapped(np.diag([-1.0, 1.0])).settle())
 
 
+@pytest.mark.thorough
 @ARCHES_THOROUGHLY
 @few
 @given(random=st.randoms(use_true_random=False))
@@ -175,7 +176,7 @@ def test_far_from_the_origin(name, shift):
     assert_same(name, CASES[name].mapped(np.eye(2), np.array(shift)).settle())
 
 
-@pytest.mark.parametrize("scale", [1.0, 10.0**1.25])
+@pytest.mark.parametrize("scale", [1.0, pytest.param(10.0**1.25, marks=pytest.mark.thorough)])
 def test_blocks_that_sink_along_a_head_joint_do_not_move_sideways(scale):
     """Nothing pushes them. The block above, whose centroid lies beyond its bearing, follows and turns about it."""
     case = CASES["sinking wall"]

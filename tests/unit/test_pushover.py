@@ -150,6 +150,7 @@ def test_what_has_fallen_is_marked():
     assert "no capacity is left" in response.message
 
 
+@pytest.mark.thorough
 def test_a_tie_of_a_later_phase_is_refused_unless_an_increment_tells_of_it():
     assembly = block()
     control = solver.ControlDisplacement("block", (1, 0), increment=0.005, limit=0.01)
@@ -304,6 +305,7 @@ def test_a_pushover_begins_at_the_limit_load_of_friction_that_does_not_dilate(pu
     assert again.load_multiplier == pytest.approx(at_pose.multiplier, abs=1e-6)
 
 
+@pytest.mark.thorough
 def test_the_first_multiplier_of_a_pushover_is_of_the_prestress_that_ties_are_drawn_with():
     """Of both blocks that slide as one it is 0.6, of the wall alone, tied to the other one, less."""
     found = []
@@ -439,6 +441,7 @@ def test_the_lift_of_a_corner_is_followed_to_where_it_is_largest():
     assert response.path[-1].parameter == pytest.approx(np.hypot(0.2, 1.0) - 1.0, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_a_program_that_fails_on_the_way_is_told_with_the_increment_before(monkeypatch):
     """Bounds that are not found from some increment on end the analysis beyond the last one."""
     bounds = "solver.path.equilibrium_check.EquilibriumChecks.bounds"

@@ -121,6 +121,7 @@ def test_a_body_that_is_not_closed_is_marked_with_its_open_edges(tmp_path):
     assert {"read: 2", "refused: 1", "edges that are not of two faces: 4", "stone 1"} <= said
 
 
+@pytest.mark.thorough
 def test_overlaps_in_space_are_coloured(tmp_path):
     found = inspect(bodies(tmp_path / "a.obj", BOX, BOX, BOX))
     draw_inspection(found, tmp_path / "a.svg")
@@ -135,7 +136,7 @@ def test_the_ground_is_drawn_below_and_blocks_that_fall_are_told_apart(tmp_path)
     assert said <= set(_comments(words_of(path)))
 
 
-@pytest.mark.parametrize("lower", [0.0, 0.1])
+@pytest.mark.parametrize("lower", [0.0, pytest.param(0.1, marks=pytest.mark.thorough)])
 def test_pits_in_the_ground_are_told_in_the_picture_and_in_the_case(tmp_path, lower):
     """They looked like slots that nobody had asked for."""
     drawn, case = tmp_path / "a.json", tmp_path / "a.toml"

@@ -69,7 +69,9 @@ def test_what_is_where(tmp_path):
     assert alike(colour_at(last.pose.positions[assembly.moving][0]), palette.SETTLEMENT)
 
 
-@pytest.mark.parametrize("foot", [0.0, -0.2], ids=["below its load", "at its centroid"])
+@pytest.mark.parametrize(
+    "foot", [pytest.param(0.0, marks=pytest.mark.thorough), -0.2], ids=["below its load", "at its centroid"]
+)
 def test_a_support_that_turns_has_an_arrow_at_both_ends(foot, tmp_path):
     """One arrow would show ground that tilts as pushed aside."""
     stones = [rectangle(-0.3, 0.4 * k, 0.3, 0.4 * k + 0.4) for k in range(8)]
@@ -292,6 +294,7 @@ def test_of_many_magnified_blocks_no_marks_are_promised_at_true_scale(tmp_path, 
     assert [key.text for key in words[0]["keys"]] == ["open joint", "hinges, sliding joints and forces not shown"]
 
 
+@pytest.mark.thorough
 def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, words):
     """Blocks stand off the equilibrium that the title gives; and nothing settles, so no support is."""
     solids = [box((-1, -1, -0.4), (1, 1, 0)), box((-0.2, -0.2, 0), (0.2, 0.2, 1))]
@@ -328,6 +331,7 @@ def test_mechanism_shows_parts_and_motion(tmp_path):
     assert alike(body, palette.SETTLEMENT).sum() > 500
 
 
+@pytest.mark.thorough
 def test_one_rattling_brick_does_not_hide_the_motion_of_a_wall(tmp_path):
     calm = parted(wall(24, 16), 2, 0)
     calm = replace(calm, collapse=None, stop=solver.Status.LIMIT_REACHED)
@@ -342,6 +346,7 @@ def test_one_rattling_brick_does_not_hide_the_motion_of_a_wall(tmp_path):
     assert (np.abs(one - other).max(axis=2) > 30).mean() < 0.01
 
 
+@pytest.mark.thorough
 def test_mechanism_of_a_structure_that_never_stood(tmp_path):
     assembly = solver.Assembly.from_outlines(
         [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0.9, 1], [3, 1], [3, 2], [0.9, 2]], [[-1, -1], [1, -1], [1, 0], [-1, 0]]],
@@ -424,6 +429,7 @@ def test_wrong_options_are_named(tmp_path):
         animate(arch_response(), tmp_path / "a.mp4", seconds=-1, size=SMALL)
 
 
+@pytest.mark.thorough
 def test_a_support_that_turns_stays_in_the_frame():
     blocks = [
         rectangle(0, 0, 1, 0.5),
@@ -575,6 +581,7 @@ def test_the_dot_moves_along_the_curve_beside_the_blocks():
     assert end[0] < start[0]
 
 
+@pytest.mark.thorough
 def test_the_curve_beside_the_blocks_has_no_dot_for_a_phase_that_is_not_on_it():
     response = sunk_and_tilted(0.1)
     panel = CurvePanel(response, (300, 200), 12)

@@ -80,6 +80,7 @@ def test_a_plate_that_overlaps_would_fold_is_refused(tmp_path):
         read(path, overlap_tolerance=0.02)
 
 
+@pytest.mark.thorough
 def test_a_joint_thickness_that_closes_nothing_says_so(tmp_path):
     # Another overlap than none: a millimetre that is cut away.
     for number, over in enumerate((0.0, 1e-3)):

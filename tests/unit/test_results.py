@@ -32,6 +32,7 @@ def test_reopens_as_the_same_response(arch, arch_folder):
     np.testing.assert_allclose(again.collapse.mechanism, arch.collapse.mechanism, rtol=1e-12)
 
 
+@pytest.mark.thorough
 def test_a_collapse_without_frames_of_its_fall_comes_back_with_its_mechanism(arch, tmp_path):
     bare = replace(arch, increments=arch.path)
     again = blockvis.open_results(blockvis.write(bare, tmp_path / "out"))
@@ -71,6 +72,7 @@ def test_the_last_equilibrium_has_the_joints_of_the_collapse_in_every_file(arch,
     assert f"<td>contact points</td><td>{summary['n_contacts']}</td>" in report
 
 
+@pytest.mark.thorough
 def test_linear_programs_word_their_mechanism_as_the_summary_does(tmp_path):
     arch, controls = generators.arch(thickness_ratio=0.2, voussoirs=7), solver.Controls(increments="linear program")
     spread = solver.Settlement((1, 0), increment=0.1, limit=3.0)

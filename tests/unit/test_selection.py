@@ -75,6 +75,7 @@ def test_what_is_no_block_is_left_out_with_a_note(tmp_path, extra, note):
         assert read(tmp_path / "wall.dxf").n_blocks == 16
 
 
+@pytest.mark.thorough
 def test_windows_among_stones_on_their_own_layer_are_named(tmp_path, capsys):
     def facade(*windows):
         document = ezdxf.new("R2010")

@@ -32,7 +32,11 @@ def response(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "motion", ['direction = [0, -1]\nblocks = ["pier"]', "profile = {supports = {pier = [0, -1]}}"]
+    "motion",
+    [
+        'direction = [0, -1]\nblocks = ["pier"]',
+        pytest.param("profile = {supports = {pier = [0, -1]}}", marks=pytest.mark.thorough),
+    ],
 )
 def test_a_settlement_moves_all_supports_with_its_name(response, motion):
     found = response(f"{STEP}{motion}")
@@ -65,6 +69,7 @@ def test_loads_and_removals_are_of_all_blocks_with_their_name(response):
     assert found.path[-1].removed.tolist() == [False] * 4 + [True] * 2
 
 
+@pytest.mark.thorough
 def test_loads_and_removals_are_of_all_blocks_of_a_material(response):
     """Of a drawing in CAD, whose blocks have no names, that is a layer; a name that is there comes first."""
     stones = {"material": ["mid"] * 4 + ["CAPS"] * 2}

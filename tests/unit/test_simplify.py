@@ -82,6 +82,7 @@ def test_a_thin_block_is_not_folded(tmp_path):
     assert shapely.Polygon(found[0]).area > 0.8 * shapely.Polygon(arch).area
 
 
+@pytest.mark.thorough
 def test_where_nothing_can_be_simplified_that_is_said(tmp_path):
     def sector(inner, outer, begin, end):
         angles = np.radians(np.linspace(begin, end, 2 + int((end - begin) / 0.2)))

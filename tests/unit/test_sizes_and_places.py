@@ -56,6 +56,7 @@ def test_any_size(ordinary, scale):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("scale", [1.0, pytest.param(100.0, marks=pytest.mark.thorough)])
 def test_any_place(ordinary, scale):
     """Corners on a grid are rounded to a nanometre: the same collapse, within its bracket, and the same reactions."""
@@ -143,7 +144,13 @@ CRUMB = np.array([[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]])
     [1e-6, pytest.param(1e-4, marks=pytest.mark.thorough)],
 )
 @pytest.mark.parametrize(
-    ("place", "stands"), [((0.2, 1.1), True), ((0.96, 1.1), False), ((1.5, 2.0), False), (None, True)]
+    ("place", "stands"),
+    [
+        ((0.2, 1.1), True),
+        ((0.96, 1.1), False),
+        pytest.param((1.5, 2.0), False, marks=pytest.mark.thorough),
+        pytest.param(None, True, marks=pytest.mark.thorough),
+    ],
 )
 def test_a_crumb_stands_or_falls_at_any_share_of_the_weight(share, place, stands):
     """On a block, over its edge by more than half its width, in the air; two more carry the block, of its weight."""

@@ -80,7 +80,16 @@ STRUCTURES = {"corner": corner_of_walls, "dome": dome}
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
-@pytest.mark.parametrize("change", ["turned", "mirrored", "renumbered", "far away", "drawn otherwise"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param("turned", marks=pytest.mark.thorough),
+        "mirrored",
+        "renumbered",
+        pytest.param("far away", marks=pytest.mark.thorough),
+        "drawn otherwise",
+    ],
+)
 def test_the_same_structure_has_the_same_points(structure, change):
     random = np.random.default_rng(5)
     solids = STRUCTURES[structure]()
@@ -327,7 +336,7 @@ def test_edges_across_each_other_are_one_point():
     np.testing.assert_allclose(np.abs(contacts.frames[:, 0, 2]), 1.0)
 
 
-@pytest.mark.parametrize("bonded", [True, False])
+@pytest.mark.parametrize("bonded", [pytest.param(True, marks=pytest.mark.thorough), False])
 def test_contact_points_do_not_depend_on_how_corners_are_numbered(bonded):
     """Stones on the groins are cut into convex parts, in one of two ways that are as good."""
     vault = generators.cross_vault(voussoirs=7, stone=1.2, bonded=bonded)

@@ -465,6 +465,7 @@ def test_the_summary_tells_what_the_ground_carries(tmp_path, capsys):
         assert float(tilt) == pytest.approx(0.005, rel=0.03)
 
 
+@pytest.mark.thorough
 def test_the_corner_that_slid_over_the_joint_of_two_grounds_has_the_area_of_its_brick(tmp_path, capsys):
     """Its force is shared by two points, of which one has an area of some mm²."""
     bricks = [rectangle(-1.0, 0.0, 0.0, 0.5), rectangle(0.0, 0.0, 1.0, 0.5), rectangle(-1.0, 0.5, 1.0, 1.0)]

@@ -255,6 +255,7 @@ def test_a_pose_of_other_blocks_is_refused(block):
             analyse(pose=pose)
 
 
+@pytest.mark.thorough
 def test_what_has_no_equilibrium_has_no_first_reaction():
     loose = solver.Assembly.from_outlines([GROUND, BLOCK, [[5, 5], [6, 5], [6, 6]]], roles=["moving", "free", "free"])
     response = solver.settle(loose, solver.Settlement((0, -1)))

@@ -527,7 +527,7 @@ def linear():
     return study, table
 
 
-@pytest.mark.parametrize("of_the_first", [0.15, 0.14])
+@pytest.mark.parametrize("of_the_first", [pytest.param(0.15, marks=pytest.mark.thorough), 0.14])
 def test_an_outcome_that_one_run_has_alone_or_that_never_changes_has_no_index(linear, of_the_first):
     study, table = linear
     outcome = np.where(np.arange(study.n_runs) < 1, of_the_first, 0.14)
@@ -542,6 +542,7 @@ def test_first_order_indices_of_a_linear_function(linear):
     assert found["b"][0] == pytest.approx(0.2, abs=0.08)
 
 
+@pytest.mark.thorough
 def test_an_index_has_an_error_of_what_chance_does():
     """Of a grid the repeats alone: its values are all that there are."""
     study = _study("grid", parameters={"material.friction_coefficient": {"name": "a", "values": [0.4, 0.5]}})

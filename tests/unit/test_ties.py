@@ -481,6 +481,7 @@ def test_what_a_prop_presses_from_the_ground_alone_is_wedged():
     assert 0.0 < float(at) < 1e-3
 
 
+@pytest.mark.thorough
 def test_forces_within_joints_are_shared_alike_beside_a_tie_that_yields():
     """An arch whose springer moves out: both points of a joint that does not slide have about the same shear."""
     tie = solver.Tie("tie", (0, 11), ((-0.6, 0.2), (0.6, 0.2)), stiffness=1e6, strength=2e3)
@@ -493,6 +494,7 @@ def test_forces_within_joints_are_shared_alike_beside_a_tie_that_yields():
     assert np.ptp(of_springer[:, 1]) < 1e-3 * of_springer[:, 0].sum()
 
 
+@pytest.mark.thorough
 def test_a_prop_that_carries_nothing_changes_no_force():
     """A member without any force to choose has no place in the programs of the forces in the joints."""
     wall = panel(nb=3, nc=4, block_height=0.4, depth=0.6)
@@ -509,6 +511,7 @@ def test_a_prop_that_carries_nothing_changes_no_force():
         assert of_all == pytest.approx(forces, abs=1e-5 * np.abs(forces).max())
 
 
+@pytest.mark.thorough
 def test_a_bar_in_tension_acts_as_a_tie_from_the_start():
     """An arch with elastic joints, whose forces at rest decide its path; they were the mean of two limit states."""
     stiff = solver.Interfaces(solver.InterfaceLaw(0.7, normal_stiffness=1e8, shear_stiffness=4e7))

@@ -175,6 +175,7 @@ def test_a_unit_in_doubt_stops_a_run_until_the_case_gives_one(tmp_path, capsys):
         assert np.ptp(assembly.vertices[assembly.vertices[:, 1] > -1.0, 0]) == pytest.approx(width)
 
 
+@pytest.mark.thorough
 def test_the_unit_of_a_layout_of_our_own_holds(tmp_path):
     """A model of stones of 13 mm, which cm would make common masonry: the doubt is a note until `unit` is given."""
     bricks(tmp_path / "a.json", 100.0)

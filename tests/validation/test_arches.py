@@ -99,7 +99,7 @@ def test_odd_number_of_voussoirs_follows_the_stable_asymmetric_path():
     assert np.abs(turned + turned[::-1]).max() > 1e-4
 
 
-@pytest.mark.parametrize(("n", "thinnest"), [(24, 0.107478), (48, 0.107478)])
+@pytest.mark.parametrize(("n", "thinnest"), [(24, 0.107478), pytest.param(48, 0.107478, marks=pytest.mark.thorough)])
 def test_minimum_thickness_of_the_semicircle(n, thinnest):
     """Below Milankovitch's thickness no equilibrium exists; with few voussoirs a little less is enough."""
     still = solver.Settlement(direction=(1, 0), increment=1e-4, limit=1e-4)

@@ -163,6 +163,7 @@ def test_what_touches_in_the_plane_touches_there_in_space(name):
     assert len(solid) == 2 * len(expected)
 
 
+@pytest.mark.thorough
 def test_cells_of_space_touch_in_their_common_faces():
     """A cube cut into the cells around random points, with faces and edges of all sizes: every face, to its area."""
     random = np.random.default_rng(1)

@@ -60,7 +60,7 @@ def thrust_by_hand(spread: float) -> float:
     return float(moment / after[1] - push)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dimension", [pytest.param(2, marks=pytest.mark.thorough), 3])
 def test_thrust_of_a_filled_arch_of_two_blocks_is_that_of_three_hinges(dimension: int) -> None:
     settlement = solver.Settlement(np.eye(dimension)[0], increment=0.1, limit=0.1)
     response = with_fill(two_block_arch(dimension)).settle(settlement)
@@ -142,6 +142,7 @@ def test_in_space_an_acceleration_acts_on_the_fill_along_a_pushover() -> None:
         assert increment.measured == pytest.approx(multiplier_by_hand(lean), abs=1e-5)
 
 
+@pytest.mark.thorough
 def test_a_pushover_under_fill_is_that_of_a_block_by_hand() -> None:
     control = solver.ControlDisplacement("block", point=(0.5, 1.0), increment=0.2, limit=0.2)
     response = filled_block().pushover(control)

@@ -81,10 +81,7 @@ DESCRIPTIONS = {
 @EACH_WALL
 @pytest.mark.parametrize(
     "description",
-    [
-        pytest.param(name, marks=() if name in ("mirrored", "shuffled", "turned") else pytest.mark.thorough)
-        for name in DESCRIPTIONS
-    ],
+    [pytest.param(name, marks=() if name == "shuffled" else pytest.mark.thorough) for name in DESCRIPTIONS],
 )
 def test_a_wall_sinks_alike_however_it_is_described(name, description):
     settlement, expected = as_drawn(name)

@@ -160,6 +160,7 @@ def test_overturning_block_and_stack(n):
     assert response.collapse.displacement == pytest.approx(zero, abs=5e-6)
 
 
+@pytest.mark.thorough
 def test_a_sliding_block_keeps_its_multiplier_and_its_height():
     assembly = on_ground([[[0, 0], [1, 0], [1, 0.5], [0, 0.5]]], -1.0, 4.0)
     control = solver.ControlDisplacement(assembly.names[0], (1, 0), increment=0.05, limit=0.5)
@@ -172,7 +173,7 @@ def test_a_sliding_block_keeps_its_multiplier_and_its_height():
     assert last == pytest.approx([0.5, 0.0, 0.0], abs=1e-8)
 
 
-@pytest.mark.parametrize("friction", [0.15, 0.7])
+@pytest.mark.parametrize("friction", [pytest.param(0.15, marks=pytest.mark.thorough), 0.7])
 def test_capacity_left_after_a_support_has_tilted(friction):
     """On a support tilted by θ a block overturns downhill at tan(atan(b/h) - θ), or slides at tan(atan(μ) - θ)."""
     assembly = stack(1, left=-0.5, right=1.0, role="moving")

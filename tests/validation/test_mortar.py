@@ -279,6 +279,7 @@ def test_a_block_that_leans_on_springs_tips_about_its_edge(interfaces):
             analysis(pose=sunk.pose)
 
 
+@pytest.mark.thorough
 def test_capacities_with_stiff_joints_are_those_with_rigid_ones():
     """Of an arch that has spread; with a stiffness of 1e10 Pa/m they are 0.1 % less."""
     arch = generators.build("arch", {"voussoirs": 11})
@@ -578,7 +579,7 @@ def test_a_wall_with_mortar_goes_on_from_its_checkpoint_bit_for_bit():
 
 
 @pytest.mark.path
-@pytest.mark.parametrize("settlement", [2e-4, 2e-3])
+@pytest.mark.parametrize("settlement", [2e-4, pytest.param(2e-3, marks=pytest.mark.thorough)])
 def test_a_block_on_two_elastic_joints_tilts_as_on_springs(settlement):
     """Four springs k A / 4 under a block of weight W: the right pair sinks, and the weight leans with the tilt."""
     outlines = [rectangle(-1.0, -1.0, 0.5, 0.0), rectangle(0.5, -1.0, 2.0, 0.0), rectangle(0.0, 0.0, 1.0, 1.0)]
@@ -594,7 +595,7 @@ def test_a_block_on_two_elastic_joints_tilts_as_on_springs(settlement):
 
 
 @pytest.mark.parametrize(("factor", "status"), [(0.9, "no initial equilibrium"), (1.05, "limit reached")])
-@pytest.mark.parametrize("n_drums", [1, 5])
+@pytest.mark.parametrize("n_drums", [1, pytest.param(5, marks=pytest.mark.thorough)])
 def test_a_tower_on_soft_ground_stands_as_long_as_it_is_stable(factor, status, n_drums):
     """By hand it leans ever farther below k A b²/4 = W h/2; upright it is in equilibrium on any ground."""
     height, weight = 10.0, 10.0 * 2000.0 * solver.GRAVITY

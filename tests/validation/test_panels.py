@@ -59,13 +59,16 @@ def test_onset(bricks, courses, start, friction_coefficient, ratio):
     assert response.initial_reaction / response.total_weight == pytest.approx(ratio, abs=1e-6)
 
 
-@pytest.mark.parametrize("increment", [1e-4, 0.1])
+@pytest.mark.parametrize("increment", [1e-4, pytest.param(0.1, marks=pytest.mark.thorough)])
 def test_onset_does_not_depend_on_the_increment(increment):
     response = onset(panel(5, 6, 5.0), 0.3, increment)
     assert response.initial_reaction / response.total_weight == pytest.approx(0.169916245, abs=1e-6)
 
 
-@pytest.mark.parametrize("friction_coefficient", [0.0, 0.3, 0.6, 0.75, 2.0])
+@pytest.mark.parametrize(
+    "friction_coefficient",
+    [pytest.param(0.0, marks=pytest.mark.thorough), 0.3, 0.6, pytest.param(0.75, marks=pytest.mark.thorough), 2.0],
+)
 def test_column_that_drops_along_a_head_joint(friction_coefficient):
     """R = W_m / (1 + μ²): the flow rule is associative, so that the column moves away at μ times what it drops.
 

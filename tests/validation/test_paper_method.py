@@ -54,6 +54,7 @@ def test_a_hinge_jumps_to_the_next_joint():
     assert response.collapse.displacement == pytest.approx(0.14352524, rel=2e-3)
 
 
+@pytest.mark.thorough
 def test_arch_on_a_sinking_support():
     """Collapse at v/R = 0.33003942; vertical reaction 0.487901 W at first and 0.559286 W at last."""
     response = settle(generators.arch(thickness_ratio=0.15, voussoirs=12), 2.0, increment=0.02, limit=1, tolerance=1e-5)

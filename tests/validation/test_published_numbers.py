@@ -45,7 +45,7 @@ def least(holds, low, high, steps):
 
 
 @pytest.mark.parametrize("voussoirs", VOUSSOIRS)
-@pytest.mark.parametrize("thickness_ratio", [0.200637, 0.3])
+@pytest.mark.parametrize("thickness_ratio", [0.200637, pytest.param(0.3, marks=pytest.mark.thorough)])
 def test_least_friction_of_a_semicircular_arch(voussoirs, thickness_ratio):
     """It slides at its springers and near 30° from the crown, however thick; at t/R = 0.200637 it hinges as well."""
     friction = least(lambda mu: stands(voussoirs, thickness_ratio, mu), 0.305, 0.315, 8)
@@ -54,7 +54,10 @@ def test_least_friction_of_a_semicircular_arch(voussoirs, thickness_ratio):
 
 @pytest.mark.parametrize(
     ("friction_coefficient", "low", "thrust"),
-    [pytest.param(0.5, 0.106, 0.621772, id="hinges"), pytest.param(0.3094, 0.198, 0.485714, id="slides and hinges")],
+    [
+        pytest.param(0.5, 0.106, 0.621772, id="hinges"),
+        pytest.param(0.3094, 0.198, 0.485714, id="slides and hinges", marks=pytest.mark.thorough),
+    ],
 )
 def test_thrust_at_the_least_thickness(friction_coefficient, low, thrust):
     """H / (w R) where but one thrust line is left, w the weight per length of the centreline."""

@@ -57,7 +57,7 @@ def leaning_plug(sides, turned=0.0, scale=1.0, mirrored=False):
     [
         pytest.param(3, 0.0, 1.0, False, marks=pytest.mark.thorough),
         pytest.param(6, 0.0, 1.0, False, marks=pytest.mark.thorough),
-        (3, 0.7, 1.0, True),
+        pytest.param(3, 0.7, 1.0, True, marks=pytest.mark.thorough),
         (6, 0.1, 10.0, False),
     ],
 )
@@ -112,6 +112,7 @@ def test_extruded_arches_are_those_of_the_plane(voussoirs, direction, expected):
         assert other.reaction / per_metre == pytest.approx(one.reaction, rel=same)
 
 
+@pytest.mark.thorough
 def test_factors_by_fronts_and_of_a_band_give_the_same(monkeypatch):
     spreads = solver.Settlement(direction=(1, 0, 0), increment=0.01, limit=0.01)
     narrow = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
@@ -218,6 +219,7 @@ def factorisations(monkeypatch):
     return taken
 
 
+@pytest.mark.thorough
 def test_what_rounding_leaves_in_open_joints_shortens_no_step(monkeypatch):
     monkeypatch.setattr("solver.contact_step.minimise.newton", lambda *given: None)
     taken = factorisations(monkeypatch)

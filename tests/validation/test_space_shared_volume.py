@@ -44,6 +44,7 @@ def paths() -> dict[str, tuple[solver.Assembly, solver.Settlement, float]]:
     }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["plug", *(pytest.param(name, marks=pytest.mark.slow) for name in ("dome", "corner"))])
 def test_blocks_share_no_volume_at_any_increment(name):
     assembly, settlement, friction = paths()[name]

@@ -312,7 +312,7 @@ def test_torsion_of_a_face_that_is_not_convex_is_refused(stone):
         solver.limit_load(assembly, loads=loads, torsion="uniform")
 
 
-@pytest.mark.parametrize("corners", [4, 32, 128])
+@pytest.mark.parametrize("corners", [4, pytest.param(32, marks=pytest.mark.thorough), 128])
 def test_how_many_corners_a_support_has_changes_nothing_at_rest(corners):
     """A beam on three supports of one area, in the middle a drum: each carries a third."""
 
@@ -328,6 +328,7 @@ def test_how_many_corners_a_support_has_changes_nothing_at_rest(corners):
     np.testing.assert_allclose(carried, 1.0 / 3.0, rtol=1e-3)
 
 
+@pytest.mark.thorough
 def test_a_drum_carries_a_quarter_on_each_of_four_pads_wherever_outlines_begin():
     """An octagon, of whose middle course the stones lie around its corners and are not convex."""
     angles, reach = np.arange(16) * np.pi / 8, np.tile([1.0, np.cos(np.pi / 8)], 8)
