@@ -104,6 +104,7 @@ def test_labels_that_share_borders_leave_no_gap(tmp_path, turn):
     assert layout.names[0] == "label 1"
 
 
+@pytest.mark.thorough
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 5), st.sampled_from([None, 0.0]))
 def test_regions_of_any_labels_are_whole_outlines_side_by_side(tmp_path_factory, seed, most, tolerance):

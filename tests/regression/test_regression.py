@@ -114,6 +114,7 @@ THOROUGH = {
     "opening_cut",
     "panel_with_opening",
     "portal_frame",
+    "semicircular_arch",
     "vault_with_fill",
     "wall_horizontal_after_settlement",
     "wall_loaded",

@@ -358,6 +358,7 @@ def test_a_resumed_study_has_the_rows_of_one_run_at_once(arches, tmp_path, capsy
     assert StudyFolder(out, read_study(arches), force=True).missing() == list(range(8))
 
 
+@pytest.mark.thorough
 def test_what_falls_as_a_later_settlement_begins_falls_after_those_before(arches, tmp_path):
     settlement = "[[settlement]]\ndirection = [1, 0]\nincrement = 0.01\nlimit = 0.01\n"
     removed = '[[remove]]\nphase = 2\nblocks = "voussoir 3"\n'

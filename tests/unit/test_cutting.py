@@ -55,6 +55,7 @@ def check(corners, faces, rotation, scale, most):
     assert max(out_of_faces(parts.solids, k) for k in range(len(parts.block_of_part))) < 1e-6 * scale
 
 
+@pytest.mark.thorough
 @settings(max_examples=12, deadline=None)
 @given(st.sampled_from(["L", "U", "T", "star"]), length, length, length, turn, st.sampled_from([1e-3, 1.0, 1e3]))
 def test_prisms_are_filled_by_few_convex_parts(name, a, b, c, rotation, scale):

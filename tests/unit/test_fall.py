@@ -524,6 +524,7 @@ def test_a_block_falls_freely_from_a_tie_that_breaks_and_slower_from_one_that_yi
         assert engine.tensions[0] == pytest.approx(0.6 * WEIGHT, rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_a_tie_that_yields_stops_a_block_by_its_work():
     """It comes taut after a fall of 1 m: by hand it gives (its elastic stretch aside) W · 1 m / (S - W)."""
     engine = hung(tie_of(((0.0, 8.0), (0.0, 5.0)), strength=3.0 * WEIGHT), 4.0)

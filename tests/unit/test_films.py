@@ -116,6 +116,7 @@ def test_a_film_tells_what_is_taken_away_between_settlements():
     assert not any(gone for _, gone in told[:first])
 
 
+@pytest.mark.thorough
 def test_a_film_tells_what_is_taken_away_apart_from_what_falls_with_it():
     """A stone that is taken away from under two others, which are lost before the settlement begins."""
     outlines = [

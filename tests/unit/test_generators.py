@@ -257,6 +257,7 @@ def test_bricks_fill_any_wall_around_its_openings_without_overlap(sample):
     assert min(shape.area for shape in bricks) > 0.02 * 0.25 * 0.1
 
 
+@pytest.mark.thorough
 def test_facade_has_about_1500_bricks_in_regular_courses():
     facade = generators.facade()
     bricks = [i for i, kind in enumerate(facade.materials) if kind == "brick"]

@@ -475,6 +475,7 @@ def unpacked(table):
     return np.cumsum(steps, axis=0)
 
 
+@pytest.mark.thorough
 @EACH
 def test_every_increment_has_one_count(name, tmp_path):
     response = RESPONSES[name]()

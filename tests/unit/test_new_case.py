@@ -46,7 +46,7 @@ def test_white_stones_on_a_black_page_are_stones_and_no_openings_of_a_wall(tmp_p
     assert ("bond" not in values) == stones
 
 
-@pytest.mark.parametrize("ground", ["HATCH", "stones", ""])
+@pytest.mark.parametrize("ground", ["HATCH", pytest.param("stones", marks=pytest.mark.thorough), ""])
 def test_ground_that_is_drawn_as_one_stone_below_all_is_told(tmp_path, capsys, ground):
     """A façade on it did not notice that half of it settled."""
     drawing = ezdxf.new("R2010")

@@ -247,6 +247,7 @@ def solved_by_cones(given):
     return solve_between(stated, given.friction, given.size)
 
 
+@pytest.mark.thorough
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6))
 def test_pyramids_come_down_to_the_round_cones(seed, cones):

@@ -134,6 +134,7 @@ def test_frame(name, angle):
     assert_same(name, CASES[name].mapped(rotation(angle)).settle())
 
 
+@pytest.mark.thorough
 @ARCHES_THOROUGHLY
 @few
 @given(exponent=st.floats(-3, 3), heavier=st.floats(-3, 3))

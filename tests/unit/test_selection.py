@@ -191,6 +191,7 @@ def test_what_only_names_is_not_left_out_by_itself(tmp_path):
     assert read_layout(path, only=["brick", "Title"]).n_blocks == 17
 
 
+@pytest.mark.thorough
 def test_what_is_asked_to_go_cannot_refuse_the_file(tmp_path):
     """A surface in pieces is refused, unless it is left out."""
     rings = [brick(0, 0, 1, 1), brick(1, 0, 1, 1), brick(5, 5, 1, 1)]

@@ -84,6 +84,7 @@ def test_a_support_that_turns_about_a_point_of_the_grid():
     assert response.collapse.displacement == pytest.approx(np.arctan(0.5), abs=2e-5)
 
 
+@pytest.mark.thorough
 def test_a_run_on_the_grid_resumes_where_it_was_stopped():
     arch = _arch(place=GRID)
     setting = {"interfaces": solver.Interfaces(solver.InterfaceLaw(0.7)), "loads": solver.self_weight(arch)}
