@@ -124,7 +124,7 @@ def stretched(document, space):
 
 
 @pytest.mark.parametrize("draw", [two_rings, turned_over, upright, hatched, hatched_by_edges, stretched])
-@pytest.mark.parametrize("chord_tolerance", [None, 1e-4])
+@pytest.mark.parametrize("chord_tolerance", [None, pytest.param(1e-4, marks=pytest.mark.thorough)])
 def test_outlines_cut_at_other_places_of_a_circle_share_its_chords(tmp_path, draw, chord_tolerance):
     layout = read_layout(saved(tmp_path, draw), chord_tolerance=chord_tolerance)
     shapes = [shapely.Polygon(ring) for ring in layout.outlines]
@@ -468,7 +468,7 @@ def test_a_spline_of_degree_one_is_straight(tmp_path):
     assert len(read(saved(tmp_path, draw)).vertices) == 4
 
 
-@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("degree", [2, pytest.param(3, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("rational", [False, True])
 def test_closed_splines_with_the_knots_of_a_period_are_those_drawn(tmp_path, degree, rational):
     oval = [(0, 0), (5, 0), (5.5, 2.5), (5, 5), (0, 5), (-0.5, 2.5)]

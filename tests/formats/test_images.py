@@ -123,7 +123,15 @@ def test_regions_of_any_labels_are_whole_outlines_side_by_side(tmp_path_factory,
     assert shapely.area(shapes).sum() == pytest.approx(shapely.union_all(shapes).area, rel=1e-9)
 
 
-@pytest.mark.parametrize("lossy", ["a.jpg", "noisy.jpg", "small.png", "turned.png"])
+@pytest.mark.parametrize(
+    "lossy",
+    [
+        "a.jpg",
+        "noisy.jpg",
+        pytest.param("small.png", marks=pytest.mark.thorough),
+        pytest.param("turned.png", marks=pytest.mark.thorough),
+    ],
+)
 def test_antialiased_and_lossy_labels_are_those_of_the_exact_image(tmp_path, lossy, capsys):
     colours = np.random.default_rng(4).integers(70, 255, (40, 3))
     image, n = drawn_wall(gap=6, value=lambda k: tuple(colours[k].tolist()), mode="RGB")
@@ -215,7 +223,9 @@ def test_a_noisy_mask_is_that_of_the_exact_image(tmp_path):
     assert float((layout.sizes**2).sum()) == pytest.approx((np.asarray(image) > 0).sum() * 1e-4, rel=0.01)
 
 
-@pytest.mark.parametrize("quality", [30, 75, 100])
+@pytest.mark.parametrize(
+    "quality", [30, pytest.param(75, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.thorough)]
+)
 def test_joints_of_a_noisy_mask_may_be_narrow(tmp_path, quality):
     image, n = drawn_wall(gap=2)
     image = image.crop((25, 20, 275, 138)).resize((750, 354), Image.Resampling.NEAREST)
@@ -253,7 +263,14 @@ def lines_of(rings, size, ink, scale=8):
     return Image.fromarray((pixels - off).clip(0, 255).astype("uint8"))
 
 
-@pytest.mark.parametrize("ink", [(0, 0, 0), (150, 150, 150), (200, 60, 60)])
+@pytest.mark.parametrize(
+    "ink",
+    [
+        (0, 0, 0),
+        pytest.param((150, 150, 150), marks=pytest.mark.thorough),
+        pytest.param((200, 60, 60), marks=pytest.mark.thorough),
+    ],
+)
 def test_thin_lines_on_white_are_joints(tmp_path, capsys, ink):
     wall = [
         [(x, y), (x + w, y), (x + w, y + 30.5), (x, y + 30.5)]
@@ -293,7 +310,10 @@ def test_what_is_transparent_around_lines_is_paper(tmp_path, ink):
     assert read_layout(tmp_path / "lines.png", width=3.0).n_blocks == len(wall)
 
 
-@pytest.mark.parametrize("form", ["png", "jpg", "webp", "bmp"])
+@pytest.mark.parametrize(
+    "form",
+    ["png", "jpg", pytest.param("webp", marks=pytest.mark.thorough), pytest.param("bmp", marks=pytest.mark.thorough)],
+)
 def test_thick_outlines_of_stones_in_mortar_are_lines_too(tmp_path, form):
     image = Image.new("L", (640, 410), 255)
     draw = ImageDraw.Draw(image)

@@ -167,7 +167,9 @@ def test_lines_between_two_circles_cut_the_ring(tmp_path):
     assert read_layout(path, ignore=[disc]).n_blocks == 18
 
 
-@pytest.mark.parametrize("n", [7, 13, 23])
+@pytest.mark.parametrize(
+    "n", [7, pytest.param(13, marks=pytest.mark.thorough), pytest.param(23, marks=pytest.mark.thorough)]
+)
 def test_joints_that_end_on_curves_of_coarse_chords_cut_them(tmp_path, n):
     def ellipses(space):
         for major in (3000, 3600):
@@ -387,7 +389,12 @@ def across(space, **of_axes):
 
 @pytest.mark.parametrize(
     "of_axes",
-    [{"linetype": "CENTER"}, {"linetype": "DASHDOT2"}, {"of_layer": "PHANTOM"}, {"linetype": "TRATTO E PUNTO"}],
+    [
+        {"linetype": "CENTER"},
+        {"linetype": "DASHDOT2"},
+        pytest.param({"of_layer": "PHANTOM"}, marks=pytest.mark.thorough),
+        pytest.param({"linetype": "TRATTO E PUNTO"}, marks=pytest.mark.thorough),
+    ],
 )
 def test_lines_in_line_types_of_axes_are_no_joints(tmp_path, of_axes):
     document = ezdxf.new("R2010", setup=True)

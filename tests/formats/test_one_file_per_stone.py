@@ -48,7 +48,15 @@ def test_a_file_of_a_folder_has_the_roles_that_it_has_alone(tmp_path):
     assert read(tmp_path).roles.tolist() == alone[0] + alone[1]
 
 
-@pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".glb"])
+@pytest.mark.parametrize(
+    "suffix",
+    [
+        ".stl",
+        ".ply",
+        pytest.param(".obj", marks=pytest.mark.thorough),
+        pytest.param(".glb", marks=pytest.mark.thorough),
+    ],
+)
 def test_a_folder_of_one_stone_per_file(tmp_path, suffix):
     folder = stones(tmp_path / "stones", suffix)
     (folder / "notes.txt").write_text("from the scanner", encoding="utf-8")

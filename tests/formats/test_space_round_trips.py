@@ -107,7 +107,7 @@ def test_the_same_joints_are_found(vault, suffix, tmp_path):
     assert points[0] == points[1]
 
 
-@pytest.mark.parametrize("suffix", [".stl", ".glb"])
+@pytest.mark.parametrize("suffix", [".stl", pytest.param(".glb", marks=pytest.mark.thorough)])
 def test_one_file_per_stone(suffix, tmp_path):
     """In a .glb y is up."""
     dome = generators.dome(lunes=4, courses=2)

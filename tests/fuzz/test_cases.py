@@ -80,6 +80,7 @@ def _read(text: str) -> None:
     assert 10 < len(said) < 2000
 
 
+@pytest.mark.thorough
 @settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(st.sampled_from(KEYS), VALUES), min_size=1, max_size=2))
 def test_any_value_for_any_key(changes):

@@ -370,6 +370,7 @@ def test_stones_end_where_an_uneven_ground_begins():
     assert np.array_equal(closed[45], np.array(ground))
 
 
+@pytest.mark.thorough
 def test_supports_stay_and_stones_come_to_them():
     stones = rubble(2)
     ground = [np.array(support["outline"]) for support in GROUND]
@@ -670,7 +671,14 @@ def shrunk(layout, by):
     return replace(layout, blocks=smaller)
 
 
-@pytest.mark.parametrize("name", ["extruded arch", "barrel vault", "L corner"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "extruded arch",
+        pytest.param("barrel vault", marks=pytest.mark.thorough),
+        pytest.param("L corner", marks=pytest.mark.thorough),
+    ],
+)
 def test_open_joints_are_measured_and_closed(name, tmp_path):
     """Named with their gaps, and closed by the joint thickness that is proposed, by hand or as "auto"."""
     built = generators.build(name, SMALL.get(name, {"voussoirs": 6}))

@@ -159,7 +159,12 @@ def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_
 
 @pytest.mark.parametrize(
     ("largest", "told"),
-    [(2.5e-7, "0.000250 mm"), (2.28753e-4, "0.229 mm"), (0.005, "5.00 mm"), (0.0123, "12.30 mm")],
+    [
+        (2.5e-7, "0.000250 mm"),
+        (2.28753e-4, "0.229 mm"),
+        pytest.param(0.005, "5.00 mm", marks=pytest.mark.thorough),
+        pytest.param(0.0123, "12.30 mm", marks=pytest.mark.thorough),
+    ],
 )
 def test_small_settlements_are_in_millimetres_with_digits_however_small_they_are(largest, told, tmp_path):
     response = arch_response()
@@ -228,7 +233,7 @@ def test_words_of_short_phases_stand_apart_and_above_the_plot(tmp_path):
     assert second + 8.0 < third < top
 
 
-@pytest.mark.parametrize(("positions", "upright"), [(17, True), (5, False)])
+@pytest.mark.parametrize(("positions", "upright"), [(17, True), pytest.param(5, False, marks=pytest.mark.thorough)])
 def test_what_is_unbounded_is_said_inside_its_band(positions, upright, tmp_path):
     text = draw_curve(partly_unbounded(positions), tmp_path / "curve.svg").read_text(encoding="utf-8")
     found = re.search(r"<!-- unbounded -->\s*<g [^>]*translate\(([\d.]+) [\d.]+\)( rotate\(-90\))?", text)

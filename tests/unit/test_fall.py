@@ -246,7 +246,9 @@ def test_what_tips_turns_as_the_equation_of_motion_says():
     np.testing.assert_allclose(beyond, exact, rtol=0.05)
 
 
-@pytest.mark.parametrize("height", [0.5, 0.87, 2.3])
+@pytest.mark.parametrize(
+    "height", [0.5, pytest.param(0.87, marks=pytest.mark.thorough), pytest.param(2.3, marks=pytest.mark.thorough)]
+)
 def test_a_blow_takes_the_speed_along_that_friction_has_by_its_impulse(height):
     """A stone lands with 8 m/s along: by the normal force of the step before it lost up to half as much again."""
     outlines = [rectangle(-50.0, -1.0, 50.0, 0.0), rectangle(0.0, height, 1.0, height + 0.2)]
@@ -631,6 +633,7 @@ def engine_of(velocity, shift=(0.0, 0.0, 0.0)):
     return Engine(whole, loads, response.interfaces, pose, motion)
 
 
+@pytest.mark.thorough
 def test_a_block_in_the_air_falls_as_free_bodies_do():
     engine = engine_of((0.0, 2.0, 0.0, 0.0, 0.0, 0.0), shift=(0.0, 0.5, 0.5))
     start = engine.pose.positions[3].copy()

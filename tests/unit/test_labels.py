@@ -90,6 +90,7 @@ def keys_of(response, **look):
     return {key.text: key.kind for key in drawer.keys}
 
 
+@pytest.mark.thorough
 def test_the_legend_lists_what_is_drawn_and_what_is_too_much():
     few = keys_of(parted(wall(8, 6), 3, 0))
     assert {"open joint", "sliding joint"} <= set(few)

@@ -244,7 +244,7 @@ def test_a_load_on_top_stands_on_the_surface():
         solver.load_on_top(assembly, 9.0)
 
 
-@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+@pytest.mark.parametrize("flow", ["associative", pytest.param("non-associative", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_supports_carry_the_loads_of_the_limit_state(dimension, flow):
     assembly = generators.arch() if dimension == 2 else generators.l_corner(bricks=2, across=2, courses=3)

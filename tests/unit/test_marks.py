@@ -373,6 +373,7 @@ def test_cracks_apart_are_lines_of_their_own_the_widest_first():
     assert words[1] == ("and", "1 narrower one")
 
 
+@pytest.mark.thorough
 def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
     arch = structures.arch_response()
     cracks = cracks_of(arch.assembly, arch.path[-1].pose)

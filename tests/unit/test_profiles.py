@@ -285,8 +285,10 @@ def test_a_profile_that_names_no_support_says_which_there_are(tmp_path, capsys):
     ("motion", "reaction", "is_work"),
     [
         ("direction = [0, -1]", 19620.0, False),
-        ("direction = [0, -1]\nrotation_centre = [3, 0]\nrotation = -0.2", 7848.0, True),
-        ("profile = { supports = { base = [0, -1, 0.1] } }", 19620.0, True),
+        pytest.param(
+            "direction = [0, -1]\nrotation_centre = [3, 0]\nrotation = -0.2", 7848.0, True, marks=pytest.mark.thorough
+        ),
+        pytest.param("profile = { supports = { base = [0, -1, 0.1] } }", 19620.0, True, marks=pytest.mark.thorough),
     ],
 )
 def test_where_supports_turn_as_they_sink_the_reaction_is_told_as_work(tmp_path, capsys, motion, reaction, is_work):
@@ -360,6 +362,7 @@ def test_how_wide_the_ground_is_drawn_counts_for_nothing(tmp_path):
     np.testing.assert_allclose(found, [expected] * 3, atol=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore:the ground follows")
 def test_a_straight_profile_along_x_strains_the_ground(tmp_path):
     text = drawn(tmp_path, {"ground": (0.0, 4.0)})

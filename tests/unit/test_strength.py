@@ -68,7 +68,7 @@ def test_a_block_glued_between_two_walls_slips_at_its_cohesion(dimension, more):
     assert found.forces[:, 0] == pytest.approx(0.0, abs=1e-5 * weight)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize(("tension", "strength"), [(3e3, 1e5), (1e4, 1e6)])
 def test_a_block_glued_between_two_walls_that_is_pushed_at_one_of_them_locks_until_it_crushes(
     dimension, tension, strength

@@ -141,7 +141,7 @@ def keystone(degrees):
     return solver.Assembly.from_outlines([key, *side], roles=["free", "fixed", "moving"])
 
 
-@pytest.mark.parametrize(("degrees", "mu"), [(20, 0.3), (15, 0.6)])
+@pytest.mark.parametrize(("degrees", "mu"), [(20, 0.3), pytest.param(15, 0.6, marks=pytest.mark.thorough)])
 def test_gap_functions_take_the_lift_of_sliding_joints_back(degrees, mu):
     """A keystone between spreading supports sinks by d/(2 tan β) at H = (W/2) cot(β + φ)."""
     response = settle(keystone(degrees), mu, direction=(1, 0), increment=0.02, limit=0.1)
@@ -174,7 +174,7 @@ def test_stops_are_reported():
     assert response.settlement.tolist() == [0.0, 0.013, 0.02, 0.04, 0.05]
 
 
-@pytest.mark.parametrize("increments", ["linear program", "coulomb"])
+@pytest.mark.parametrize("increments", ["linear program", pytest.param("coulomb", marks=pytest.mark.thorough)])
 def test_a_multiple_that_is_the_limit_but_for_rounding_is_the_limit(increments):
     arch = generators.arch(thickness_ratio=0.15, voussoirs=12)
     response = settle(arch, 2.0, solver.Controls(increments=increments), direction=(1, 0), increment=0.009, limit=0.027)
