@@ -79,6 +79,7 @@ def test_edges_beside_a_corner_of_stones_that_touch_are_no_joint(tmp_path, capsy
     assert len(blockvis.inspect(tmp_path / "wall.dxf").joints) == 0
 
 
+@pytest.mark.thorough
 def test_a_window_reads_what_lies_within_it_and_tells_what_it_cuts(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     drawn("wall.dxf", *(brick(x, y) for x in (0, 1, 2) for y in (0, 0.5)), brick(10, 0), brick(12, 0))

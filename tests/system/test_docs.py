@@ -44,6 +44,7 @@ def test_keys_of_the_summary_are_named(arch_folder):
     assert missing(keys_of(json.loads((arch_folder / "summary.json").read_text(encoding="utf-8")))) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "kind",
     [

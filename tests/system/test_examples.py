@@ -15,6 +15,7 @@ FACADE = Path(__file__).parents[2] / "examples" / "facade.toml"
 pytestmark = pytest.mark.path
 
 
+@pytest.mark.thorough
 def test_the_facade_is_built():
     assembly = assembly_of(read_case(FACADE))
     assert assembly.n_blocks > 1400

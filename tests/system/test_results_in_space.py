@@ -559,6 +559,7 @@ def test_a_mechanism_swings_as_far_on_the_page_as_if_its_hinges_might_part(tmp_p
     np.testing.assert_allclose(motions[-1], 1.2 / swing.share * swing.motion, atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_the_mechanism_of_what_never_stood_is_drawn_with_closed_hinges():
     """No forces say there where they are."""
     arch = generators.extruded_arch(voussoirs=8, thickness_ratio=0.05)
@@ -570,6 +571,7 @@ def test_the_mechanism_of_what_never_stood_is_drawn_with_closed_hinges():
     assert 0.3 < swing.share < 0.8
 
 
+@pytest.mark.thorough
 def test_a_mechanism_is_drawn_with_closed_hinges(tmp_path, monkeypatch):
     """On arcs of their own parts tear their hinges, by 34 mm here if a corner goes 5 % of the picture; arrows do."""
     response = vault_response()
@@ -704,6 +706,7 @@ def test_what_a_layout_in_space_holds_is_drawn(tmp_path, capsys):
     assert (picture[120:900].max(axis=2) < 60).sum() > 300
 
 
+@pytest.mark.thorough
 def test_notebooks_show_blocks_in_space():
     written = vault_response().assembly._repr_html_()
     assert 'src="data:image/png;base64,' in written

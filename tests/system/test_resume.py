@@ -395,6 +395,7 @@ def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
         next(mechanics.pushover_increments(other, control, resume=checkpoint, **setting))
 
 
+@pytest.mark.thorough
 def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
     arch = generators.arch()
     phases = [solver.Settlement(direction=(1, 0), increment=0.01, limit=limit) for limit in (0.02, 0.01)]
@@ -423,6 +424,7 @@ def test_checkpoint_of_another_run_is_refused():
         mechanics.settlement_increments(other, (spread,), loads=solver.self_weight(other), resume=checkpoint, **setting)
 
 
+@pytest.mark.thorough
 def test_a_response_keeps_no_checkpoints():
     arch = generators.arch()
     spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.1)

@@ -397,6 +397,7 @@ def test_drawn_blocks_that_are_no_openings_stay_and_the_bond_is_laid_around_them
     assert layout.groups.count("carved") == 1
 
 
+@pytest.mark.thorough
 def test_the_unit_of_the_drawing_holds(tmp_path):
     large = [(layer, shapely.transform(shape, lambda xy: 1000 * xy)) for layer, shape in (("A-WALL", WALL),)]
     layout = bonded(drawn(tmp_path / "mm.dxf", *large, unit=4), "walls=A-WALL")

@@ -127,6 +127,7 @@ def test_a_single_limit_load_has_numbers_on_both_axes(tmp_path):
     assert sum(bool(re.fullmatch(r"0\.\d+", line)) for line in told) >= 6
 
 
+@pytest.mark.thorough
 def test_an_envelope_is_drawn_and_written_as_a_response(tmp_path):
     """It had no increments, and a picture of it ended in an AttributeError."""
     assembly = on_a_base("fixed")
@@ -222,6 +223,7 @@ def test_phases_and_collapse_are_told_apart_and_ties_in_kilonewtons(tmp_path):
     assert height_of("collapse at ", text) > height_of("phase 2 from ", text) + 5.0
 
 
+@pytest.mark.thorough
 def test_words_of_short_phases_stand_apart_and_above_the_plot(tmp_path):
     response = parted(wall(4, 3), 9, 0)
     phases = [solver.Settlement((1, 0) if k % 2 else (0, -1)) for k in range(3)]

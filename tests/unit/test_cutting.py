@@ -63,6 +63,7 @@ def test_prisms_are_filled_by_few_convex_parts(name, a, b, c, rotation, scale):
     check(*prism(outline, 0.0, c), rotation, scale, most)
 
 
+@pytest.mark.thorough
 @settings(max_examples=8, deadline=None)
 @given(length, length, length, turn)
 def test_a_frame_is_cut_through_its_limbs(a, b, c, rotation):

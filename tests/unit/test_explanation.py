@@ -376,6 +376,7 @@ def runs_of(folder, name, arch):
     return blockvis.explain(folder / f"{name}.toml", [{"joint": "voussoir 3 | voussoir 4", "width": 0.003}])
 
 
+@pytest.mark.thorough
 def test_runs_are_known_at_all_amounts_up_to_where_joints_are_wide_open(tmp_path):
     found = runs_of(tmp_path, "near", ARCH)
     assert found.runs

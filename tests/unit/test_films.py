@@ -96,6 +96,7 @@ def test_a_film_tells_what_is_lost_and_goes_on():
     assert all(lost for parameter, _, lost in told if parameter >= named[0])
 
 
+@pytest.mark.thorough
 def test_a_film_tells_what_is_taken_away_between_settlements():
     outlines = [
         rectangle(0.0, -1.0, 2.0, 0.0),
@@ -137,6 +138,7 @@ def test_a_film_tells_what_is_taken_away_apart_from_what_falls_with_it():
     assert set(told) == {None, f"TAKEN AWAY · {assembly.names[3]}; LOST · 2 blocks"}
 
 
+@pytest.mark.thorough
 def test_of_a_photograph_what_is_taken_away_is_left_pale():
     outlines = [rectangle(-1.0, -0.5, 3.0, 0.0), *(brick(x, 0.0, 0.4, 0.5) for x in (0.0, 1.0, 2.0))]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", *["free"] * 3])

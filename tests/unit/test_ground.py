@@ -203,6 +203,7 @@ def test_no_ground_under_feet_at_any_heights_holds_a_stone(tmp_path_factory, fee
     assert least_reaction(drawing) > 0.0
 
 
+@pytest.mark.thorough
 def test_a_pad_in_space_stands_off_from_a_lower_stone(tmp_path, capsys):
     """It reached into the bulge of the stone beside it, and was refused."""
     solids = [upright(ring, 0.0, 0.4) for ring in foundation(-0.22, 0.015, 0.015)[:3]]

@@ -318,6 +318,7 @@ def test_joints_csv_has_no_opening_of_a_joint_that_is_pressed_together(tmp_path)
     assert [row["largest opening [m]"] for row in rows] == ["0", "0"]
 
 
+@pytest.mark.thorough
 def test_joints_csv_tells_the_phase_of_places_in_m_and_in_rad(tmp_path):
     response = moved_and_turned()
     out = blockvis.write(response, tmp_path / "out")

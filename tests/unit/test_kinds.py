@@ -315,6 +315,7 @@ def test_words_of_phases_in_other_units():
     assert state_text(ended.path[-1], ended).endswith("Reaction 0 N·m")
 
 
+@pytest.mark.thorough
 def test_lines_rows_and_pictures_round_a_reaction_alike():
     kind, response = KINDS["settlement"], lifted_brick()
     *others, last = response.increments
@@ -326,6 +327,7 @@ def test_lines_rows_and_pictures_round_a_reaction_alike():
     assert state_text(ended.path[-1], ended).endswith("0 N = 0.0000 W")
 
 
+@pytest.mark.thorough
 def test_rounding_of_a_reaction_is_none_and_unknown_bounds_make_no_linear_program():
     kind, response = KINDS["settlement"], lifted_brick()
     first, *others = response.increments

@@ -173,6 +173,7 @@ def test_an_existing_case_is_kept_without_force(tmp_path, capsys):
     assert read_case(case).file == case.parent / "portal.svg"
 
 
+@pytest.mark.thorough
 def test_the_name_comes_from_the_drawing_and_the_path_leads_back(tmp_path, monkeypatch, capsys):
     (tmp_path / "drawings").mkdir()
     (tmp_path / "cases").mkdir()

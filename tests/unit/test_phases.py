@@ -129,6 +129,7 @@ def test_what_was_taken_away_is_no_part_of_the_weight_that_a_loss_is_measured_by
     assert response.stop is solver.Status.COLLAPSED
 
 
+@pytest.mark.thorough
 def test_a_tie_goes_with_the_block_that_it_ends_on() -> None:
     structure = beam_on_a_prop()
     ends = structure.assembly.index("prop"), structure.assembly.index("left")

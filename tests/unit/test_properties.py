@@ -125,6 +125,7 @@ def test_cases_collapse_slide_and_settle():
     assert 0.05 < wall.initial_reaction / wall.total_weight < 0.6
 
 
+@pytest.mark.thorough
 @ARCHES_THOROUGHLY
 @few
 @given(angle=st.floats(-np.pi, np.pi))
@@ -177,6 +178,7 @@ def test_far_from_the_origin(name, shift):
     assert_same(name, CASES[name].mapped(np.eye(2), np.array(shift)).settle())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("scale", [1.0, pytest.param(10.0**1.25, marks=pytest.mark.thorough)])
 def test_blocks_that_sink_along_a_head_joint_do_not_move_sideways(scale):
     """Nothing pushes them. The block above, whose centroid lies beyond its bearing, follows and turns about it."""

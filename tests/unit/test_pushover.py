@@ -331,6 +331,7 @@ def test_a_first_multiplier_that_has_not_converged_is_noted_and_that_of_the_path
     assert not second.notes
 
 
+@pytest.mark.thorough
 def test_the_bounds_at_the_start_of_a_pushover_are_found_once(monkeypatch):
     program, found = import_module("solver.program.static_program").StaticProgram, []
     bounds = program.bounds

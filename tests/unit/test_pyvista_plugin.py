@@ -63,6 +63,7 @@ def test_a_multiblock_settles_and_its_parts_name_the_blocks():
     assert repr(accessor).startswith("<4 blocks")
 
 
+@pytest.mark.thorough
 def test_phases_follow_one_another():
     phases = [solver.Settlement(direction=(1, 0), limit=0.02), solver.Settlement(direction=(0, -1), limit=0.01)]
     response = flat_arch().blockvis.settle(ROLES, phases=phases, friction_coefficient=2.0)

@@ -155,6 +155,7 @@ def test_names_are_written_where_they_can_be_read(tmp_path):
     assert any("names not written: 40" in text for text in said)
 
 
+@pytest.mark.thorough
 def test_info_draws_supports_as_a_new_case_has_them(tmp_path):
     named = solver.Assembly.from_outlines(
         [box(0), box(2), box(0, 0.5, width=3)], names=["springer 1", "springer 2", "lintel"]

@@ -161,6 +161,7 @@ def test_laws_loads_and_changes_given_in_python_come_back(tmp_path):
     assert np.array_equal(again.loads.dead_arms, loads.dead_arms)
 
 
+@pytest.mark.thorough
 def test_what_a_folder_does_not_hold_is_told(tmp_path):
     scatter = solver.JointScatter(3, lambda part: 0.9 + 0.2 * part)
     laws = solver.Interfaces(solver.InterfaceLaw(0.4), scatter=scatter)

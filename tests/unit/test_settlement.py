@@ -444,6 +444,7 @@ def test_brick_that_rises_past_its_neighbour_does_not_turn_into_it():
         assert depth.max(initial=0.0) < 1e-3 * wall.widths.min(), increment.settlement
 
 
+@pytest.mark.thorough
 def test_equilibrium_lost_on_the_way_is_not_called_initial():
     """A wall of five blocks that has been followed for 50 mm."""
     sink = solver.Settlement(direction=(0, -1), increment=0.05, limit=0.5)

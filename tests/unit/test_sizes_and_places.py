@@ -97,6 +97,7 @@ def test_a_run_on_the_grid_resumes_where_it_was_stopped():
         assert one.pose.positions.tobytes() == other.pose.positions.tobytes()
 
 
+@pytest.mark.thorough
 def test_blocks_of_a_millimetre_and_of_a_hundred_metres_in_one_stack():
     """Cubes of 100 m, 10 m ... 1 mm on each other, of 1 to 1e5 kg/m³: the ground carries all of them as it sinks."""
     sizes = 10.0 ** np.arange(2.0, -4.0, -1.0)

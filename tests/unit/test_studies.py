@@ -707,6 +707,7 @@ def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
     assert "share of the variance" not in drawn
 
 
+@pytest.mark.thorough
 def test_values_stand_where_their_means_are(tmp_path, monkeypatch):
     """Also of two means to one side of that of all runs; the title of either panel keeps to it."""
     path = "geometry.parameters.voussoirs"

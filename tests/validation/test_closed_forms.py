@@ -157,11 +157,13 @@ def slides(increment, support):
     return np.abs(increment.displacements[carrying, 1]).max(initial=0.0) > 1e-3
 
 
+@pytest.mark.thorough
 def test_lintel_at_the_start(lintel):
     """V_right/W = 1 - L/(2 c) while the lintel turns about the corner of the left pier."""
     assert lintel.initial_reaction / lintel.total_weight == pytest.approx(1 - 4 / (2 * 3.6), abs=1e-6)
 
 
+@pytest.mark.thorough
 def test_lintel_slips_on_the_right_first_and_on_the_left_after(lintel):
     before, after = lintel.settlement < CHANGE * (1.0 - 1e-9), lintel.settlement > CHANGE * (1.0 + 1e-9)
     left = np.array([slides(i, 1) for i in lintel.path])
@@ -175,6 +177,7 @@ def test_lintel_slips_on_the_right_first_and_on_the_left_after(lintel):
     assert at_change == pytest.approx(0.420596, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_lintel_loses_its_left_bearing(lintel):
     assert lintel.stop is solver.Status.COLLAPSED
     assert lintel.collapse.displacement == pytest.approx(END, rel=1e-3)

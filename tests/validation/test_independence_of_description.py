@@ -162,6 +162,7 @@ def test_a_wall_a_thousand_times_as_heavy_ends_alike():
     assert response.reaction / response.total_weight == pytest.approx(expected, rel=2e-3)
 
 
+@pytest.mark.thorough
 def test_a_column_that_nothing_presses_against_a_wall_hangs_nothing_on_it():
     """Coulomb friction does not lift a block off what it slides along: no force in the head joint, R = W.
 

@@ -33,6 +33,7 @@ def test_a_tilted_tower_falls_about_its_toe(n_drums):
     assert mechanics.rigid_parts(tower, last).tolist() == [-1] * n_drums + [0]
 
 
+@pytest.mark.thorough
 def test_columns_under_a_long_lintel_turn_about_their_toes_and_slide_nowhere():
     """The give of their joints counted as sliding in each, and a toe that opens a little beside 5 m as no hinge."""
     left, right = ([brick(x, 0.1 * k, 0.4, 0.1) for k in range(20)] for x in (0.0, 4.6))

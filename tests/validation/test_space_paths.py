@@ -52,6 +52,7 @@ def leaning_plug(sides, turned=0.0, scale=1.0, mirrored=False):
     return solver.Assembly.from_solids(solids, names=["plug"] + [f"board {k}" for k in range(sides)], roles=roles)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("sides", "turned", "scale", "mirrored"),
     [

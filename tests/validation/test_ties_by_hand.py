@@ -88,6 +88,7 @@ def test_prestress_is_there_from_the_start_and_a_prop_carries_no_tension():
     np.testing.assert_allclose(_settled(_hung(kind="prop")).reaction, 1000.0, rtol=1e-6)
 
 
+@pytest.mark.thorough
 def test_a_bar_hung_up_is_a_rope():
     for a, b in zip(_settled(_hung()).reaction, _settled(_hung(kind="bar")).reaction, strict=True):
         assert a == pytest.approx(b, abs=0.02)
@@ -177,6 +178,7 @@ def test_a_tie_adds_its_strength_times_its_arm_to_the_acceleration_that_overturn
         assert found.multiplier - 0.05 < pushed.increments[1].load_multiplier < found.multiplier
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("flow", [pytest.param("associative", marks=pytest.mark.thorough), "non-associative"])
 def test_what_a_settlement_has_left_slack_carries_within_the_displacement_only(flow):
     """A block with a prop behind it, whose buttress has moved away by 0.1 m."""
