@@ -514,8 +514,11 @@ class Path:
         """Work of the forces at a place on supports in a motion."""
         if place.contacts is None:
             return 0.0
-        resultant = wrench_matrix(place.contacts, place.pose, self.model.length) @ place.forces.ravel()
-        return float((resultant.reshape(motion.shape) * motion)[~self.model.assembly.free].sum())
+        supports, contacts = ~self.model.assembly.free, place.contacts
+        touching = supports[contacts.block_a] | supports[contacts.block_b]
+        wrench = wrench_matrix(contacts[touching], place.pose, self.model.length)
+        resultant = wrench @ place.forces[touching].ravel()
+        return float((resultant.reshape(motion.shape) * motion)[supports].sum())
 
     def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""
