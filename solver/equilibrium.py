@@ -6,7 +6,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from .geometry.contacts import Contacts
-from .kinematics import Pose, cross_rows
+from .geometry.outlines import turn
+from .geometry.solids import cross
+from .kinematics import Pose
 
 
 def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc_array:
@@ -27,22 +29,18 @@ def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc
         contact 0, then of contact 1 .... Its transpose maps movements of the blocks to relative displacements
         (a minus b) of the contact points.
     """
-    n, d = contacts.points.shape
+    frames, (n, d) = contacts.frames, contacts.points.shape
     n_dof = d + pose.rotations.shape[1]
-    force = np.swapaxes(contacts.frames, 1, 2)
-    values, rows = [], []
-    for blocks, sign in ((contacts.block_a, 1.0), (contacts.block_b, -1.0)):
-        # The ground, -1, has no rows.
-        on_ground, block = blocks < 0, np.maximum(blocks, 0)
-        arms = cross_rows(contacts.points - pose.positions[block])
-        # Summed coordinate by coordinate, as the rounding of small matrix products depends on the processor.
-        products = [arms[:, :, k, None] * force[:, None, k] for k in range(d)]
-        moment = sum(products[1:], products[0]) / length
-        values.append(np.where(on_ground, 0.0, sign)[:, None, None] * np.concatenate([force, moment], axis=1))
-        rows.append(n_dof * block[:, None] + np.arange(n_dof))
     # Column by column: the entries of block a, then of block b.
-    data = np.swapaxes(np.concatenate(values, axis=1), 1, 2)
-    index = np.repeat(np.concatenate(rows, axis=1)[:, None, :], d, axis=1)
+    data, index = np.empty((n, d, 2, n_dof)), np.empty((n, d, 2, n_dof), dtype=np.int64)
+    for side, (blocks, sign) in enumerate(((contacts.block_a, 1.0), (contacts.block_b, -1.0))):
+        # The ground, -1, has no rows.
+        sense, block = np.where(blocks < 0, 0.0, sign)[:, None, None], np.maximum(blocks, 0)
+        arms = (contacts.points - pose.positions[block])[:, None]
+        # Coordinate by coordinate, as the rounding of small matrix products depends on the processor.
+        moment = cross(arms, frames) if d == 3 else turn(arms, frames)[..., None]
+        data[:, :, side, :d], data[:, :, side, d:] = sense * frames, sense * (moment / length)
+        index[:, :, side] = (n_dof * block[:, None] + np.arange(n_dof))[:, None]
     pointers = np.arange(0, 2 * n_dof * d * n + 1, 2 * n_dof)
     return sp.csc_array((data.ravel(), index.ravel(), pointers), shape=(n_dof * len(pose.positions), d * n))
 

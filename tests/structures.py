@@ -13,6 +13,7 @@ from dataclasses import astuple, fields, is_dataclass, replace
 from functools import cache
 from itertools import pairwise, product
 from pathlib import Path
+from unittest import mock
 
 import imageio_ffmpeg
 import numpy as np
@@ -210,26 +211,18 @@ class _Begun(Exception):
     """A run has its assembly, and is stopped."""
 
 
-class _Beginning:
-    """An output of runs that wants no more than what they begin with, read from the results folder."""
-
-    def __init__(self, read):
-        self.read = read
-
-    def begin(self, case):
-        pass
-
-    def follow(self, results):
-        raise _Begun(self.read(results))
-
-    def close(self):
-        pass
-
-
 def _at_the_beginning(case: blockvis.Case | str | Path, read):
-    with tempfile.TemporaryDirectory() as folder:
+    """What is read from the results folder of a case when its run begins."""
+    folders = sys.modules[blockvis.run_case.__module__].ResultsFolder
+    tell = folders.tell
+
+    def told(results, response):
+        tell(results, response)
+        raise _Begun(read(results))
+
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(folders, "tell", told):
         try:
-            blockvis.run_case(case, Path(folder) / "out", outputs=[_Beginning(read)])
+            blockvis.run_case(case, Path(folder) / "out", outputs=[])
         except _Begun as begun:
             return begun.args[0]
     raise AssertionError("the run ended before it began")

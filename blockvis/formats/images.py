@@ -123,7 +123,8 @@ def _check_holes(labels: Labels, regions: Regions, holed: Collection[int]) -> No
         that = f"that ({labels.names[regions.labels[largest] - 1]})" if labels.names else "its other value"
         raise ValueError(
             f"it is no picture of stones: {100.0 * area / regions.areas.sum():.0f} % of what is not background "
-            f"({labels.background or 'none'}) has holes; if {that} lies around the stones, give it as background"
+            f"({labels.background or 'none'}) has holes; if {that} lies around the stones, give it as background; "
+            "if it is that of the stones, close the joints, through whose gaps they are one"
         )
 
 

@@ -37,7 +37,7 @@ LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A face between lines, (n, 2), the layers around most of its lines, innermost last, and those around all."""
+    """A face between lines, (n, 2), the layers of most of its border, innermost last, and those around all."""
 
     ring: np.ndarray
     layers: tuple[str, ...]
@@ -66,7 +66,7 @@ def with_faces(
     """Let curves share corners, add the faces between lines to a drawing, and cut its outlines along lines in them.
 
     The drawing is in the plane. Lines that are not wanted are left out, and outlines that are not wanted are not cut.
-    ``row_of`` writes the row of a face by the layers around most of its lines, and its name; ``called`` names a piece
+    ``row_of`` writes the row of a face by the layers of most of its border, and its name; ``called`` names a piece
     by its outline's name and its number, from 0. Pieces come ``in_place`` of their outline, or behind the others. The
     tolerance is as of :func:`blockvis.formats.arcs.with_shared_corners`.
     """
@@ -450,9 +450,10 @@ def _add_faces(
 
     def add(face: Any) -> None:
         ring = np.array(shapely.orient_polygons(face).exterior.coords)[:-1]
-        border = _border(ring, tree, 2 * grid)
-        nearest = [lines[k].layer for k in border]
-        layer = max(sorted(set(nearest)), key=nearest.count)
+        border, lengths = _border(ring, tree, 2 * grid)
+        nearest = np.array([lines[k].layer for k in border])
+        # By length: an arc of many chords beside a stone, as the extrados beside a spandrel, would outvote its joints.
+        layer = max(np.unique(nearest).tolist(), key=lambda one: lengths[nearest == one].sum())
         ring = _sharpened(ring, every, grid)
         if len(face.interiors):
             found.left_out.append(_with_a_hole(face, ring, layer))
@@ -464,7 +465,7 @@ def _add_faces(
             message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
             found.left_out.append(LeftOut("across", ring, message, layer, "face"))
             return
-        found.faces.append(Face(ring, paths[layer], _words_of(nearest, paths)))
+        found.faces.append(Face(ring, paths[layer], _words_of(nearest.tolist(), paths)))
         whole.append(face)
         borders.append({*border})
 
@@ -479,11 +480,12 @@ def _add_faces(
     return len(closed)
 
 
-def _border(ring: np.ndarray, tree: Any, reach: float) -> list[int]:
-    """Numbers of the lines (an STRtree) along the edges of a face, one for each edge that lies on a line."""
-    middles = shapely.points((ring + np.roll(ring, -1, axis=0)) / 2.0)
-    on, line = tree.query_nearest(middles, max_distance=reach, all_matches=False)
-    return [int(k) for k in line[np.argsort(on, kind="stable")]]
+def _border(ring: np.ndarray, tree: Any, reach: float) -> tuple[list[int], np.ndarray]:
+    """Numbers of the lines (an STRtree) along the edges of a face that lie on one, and the lengths of these edges."""
+    ends = np.roll(ring, -1, axis=0)
+    on, line = tree.query_nearest(shapely.points((ring + ends) / 2.0), max_distance=reach, all_matches=False)
+    order = np.argsort(on, kind="stable")
+    return line[order].tolist(), np.linalg.norm(ends - ring, axis=1)[on[order]]
 
 
 def _closed_by_outlines(
@@ -518,7 +520,7 @@ def _closed_by_outlines(
         for face in shapely.polygonize([*shapely.get_parts(noded)]).geoms
         if not len(face.interiors)
         and not len(taken.query(face.buffer(-10 * grid), "intersects"))
-        and len({*_border(np.array(face.exterior.coords)[:-1], tree, 2 * grid)}) > 1
+        and len({*_border(np.array(face.exterior.coords)[:-1], tree, 2 * grid)[0]}) > 1
     ]
 
 

@@ -296,6 +296,10 @@ def _unmatched(patterns: Sequence[str], labels: Sequence[str], looks: set[str]) 
     found = []
     for pattern in patterns:
         if not matches(labels, [pattern]) and look_of(pattern) not in looks:
+            parts = list(filter(None, map(str.strip, pattern.split(","))))
+            if len(parts) > 1 and matches(labels, parts):
+                found.append(f"'{pattern}' is one pattern, and matches nothing; give each of its parts by itself")
+                continue
             listed = ", ".join(f"'{one}'" for one in by_similarity(pattern, list(dict.fromkeys(labels))[:2000])[:12])
             kinds = f"; its kinds and colours are {', '.join(sorted(looks)[:12])}" if looks else ""
             found.append(f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}{kinds}")

@@ -38,7 +38,7 @@ from .frame import (
     sheet_size,
     write_labels,
 )
-from .live_load import LiveLoads
+from .live_load import LoadArrows
 from .marks import (
     ARROW,
     SMALLEST_RESULTANT,
@@ -165,12 +165,16 @@ class Drawer:
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
-        self.live = LiveLoads(response, increments, float(frame.size.max()), self._plane)
+        extent = float(frame.size.max())
+        self.loads = {
+            kind: LoadArrows(response, increments, extent, self._plane, dead=kind == "dead") for kind in palette.LOADS
+        }
         self._arrow = (ARROW if self._flat else 0.09) * float(frame.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
         ends = np.concatenate([heads, *self._arrow_ends(frame, extra), tied])
-        ends = np.concatenate([self.live.tails, ends[heights_over(self._plane, ends) >= 0.0]])
+        tails = [loads.tails for loads in self.loads.values()]
+        ends = np.concatenate([*tails, ends[heights_over(self._plane, ends) >= 0.0]])
         frame = self._with_floor(frame.holding(self._projected(ends)))
         bar = ColourBar(self.largest, fall is not None) if look.colour_by == "displacement" else None
         size = size or sheet_size(frame, usual, CURVE * curve + BAR * (bar is not None), across)
@@ -351,7 +355,7 @@ class Drawer:
             if phases_of(self.response) and not (increment.load_multiplier and (falling or self._drawn_at is not None)):
                 seen = self.scene.frame if self._flat else None
                 self._draw_arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
-            self._draw_live_load(increment, shown, dots)
+            self._draw_loads(increment, shown, dots)
             if self.response.loads.fills:
                 self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
         self.scene.ties(self.ties.strands(increment, shown, DASH * self.scene.usual_height / 1080.0 * self.scene.pixel))
@@ -445,13 +449,16 @@ class Drawer:
         if self.response.loads.fills:
             kind = "area" if self._flat else "line"
             keys.append(Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",)))
-        if self.live.largest > 0.0:
-            keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
+        for kind, loads in self.loads.items():
+            if loads.largest > 0.0:
+                keys.append(Key("line", loads.words, palette.LOADS[kind], layers=(f"{kind} top",)))
         if self._drawn_at is not None:
             layers = ("motion outline", "motion top")
             what = "motion" if self._flat else "motion, blocks drawn after it"
             keys.append(Key("line", f"{what} (not to scale)", palette.SETTLEMENT, layers=layers))
-            keys.append(Key("line", "at equilibrium", palette.GHOST, layers=("before",)))
+            keys.append(
+                Key("line", "at equilibrium" if self.response.path else "as drawn", palette.GHOST, layers=("before",))
+            )
         return [*keys, *self._keys_of_forces()]
 
     def _keys_of_joints(self) -> list[Key]:
@@ -642,19 +649,20 @@ class Drawer:
             lines.append(np.stack(ends, axis=1))
         self.scene.bearings(np.concatenate(lines))
 
-    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray) -> None:
-        """Draw the live load times its multiplier as arrows to scale that end where it acts, short of a hinge."""
-        if self.live.largest == 0.0:
-            return
-        tails, tips = self.live.arrows(increment, shown)
-        if self._flat and len(dots) and len(tips):
-            # The dot of a hinge would hide their heads.
-            clear = 0.5 * self.sheet.text * self.scene.pixel
-            at_dot = np.linalg.norm(tips[:, None] - dots, axis=2).min(axis=1) < clear
-            along = (tips - tails) / np.maximum(np.linalg.norm(tips - tails, axis=1), 1e-300)[:, None]
-            back = clear * at_dot[:, None] * along
-            tails, tips = tails - back, tips - back
-        self._draw_arrows("live", tails, tips, palette.LIVE)
+    def _draw_loads(self, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray) -> None:
+        """Draw loads, live ones times their multiplier, as arrows that end where they act, short of a hinge."""
+        for kind, loads in self.loads.items():
+            if loads.largest == 0.0:
+                continue
+            tails, tips = loads.arrows(increment, shown)
+            if self._flat and len(dots) and len(tips):
+                # The dot of a hinge would hide their heads.
+                clear = 0.5 * self.sheet.text * self.scene.pixel
+                at_dot = np.linalg.norm(tips[:, None] - dots, axis=2).min(axis=1) < clear
+                along = (tips - tails) / np.maximum(np.linalg.norm(tips - tails, axis=1), 1e-300)[:, None]
+                back = clear * at_dot[:, None] * along
+                tails, tips = tails - back, tips - back
+            self._draw_arrows(kind, tails, tips, palette.LOADS[kind])
 
     def _draw_arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
         self._arrows[layer] = np.stack([tails, tips], axis=1)

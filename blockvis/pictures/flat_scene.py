@@ -31,11 +31,11 @@ ORDER = (
     "motion outline", "force line", "force",
     "tie rim", "tie ground", "tie slack", "tie elastic", "tie pressed", "tie yielding", "tie broken", "tie end",
     "arrow rim", "arrow top", "hinge", "hinge top", "crushing", "crushing top",
-    "motion rim", "motion top", "live rim", "live top",
+    "motion rim", "motion top", "dead rim", "dead top", "live rim", "live top",
 )  # fmt: skip
 
 #: Thickness of arrows by their layer, and the least width of a line [pixels].
-WEIGHTS = {"arrow": 1.0, "motion": 0.6, "live": 0.55}
+WEIGHTS = {"arrow": 1.0, "motion": 0.6, "live": 0.55, "dead": 0.55}
 THINNEST = 1.2
 
 Colour = tuple[int, int, int]

@@ -1,4 +1,4 @@
-"""The live load of an increment as a picture shows it: where it acts and how much."""
+"""The loads of an increment as a picture shows them: where they act and how much."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST_ARROWS = 100
 
 @dataclass(frozen=True)
 class LiveLoad:
-    """Live loads times their multiplier, in the multiplier's sign: forces (n, d) [N] at points (n, d) [m].
+    """Dead loads, or live ones times their multiplier, in its sign: forces (n, d) [N] at points (n, d) [m].
 
     Each acts on one of the blocks (n,), or on several, of which it is the resultant and one is given. In space they may
     be the largest of all that act, ``n_acting``.
@@ -62,25 +62,47 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), pose)
     dead = response.dead_at(increment)
     live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + dead + _of_ties(response, increment))
-    live[~assembly.free | increment.fallen] = 0.0
-    forces = live[:, : assembly.dimension]
-    size = np.linalg.norm(forces, axis=1)
     # What is out of balance would be a load, too, where a pushover ends with hardly any.
     unbalanced = increment.certificate.equilibrium_residual * np.abs(dead[assembly.free, : assembly.dimension]).sum()
-    blocks = acting = np.flatnonzero(size > max(ROUNDING * np.abs(live).max(initial=0.0), 2.0 * unbalanced))
+    given = response.loads_at(increment)
+    return _acting(response, increment, live, (given.live, given.live_arms), 2.0 * unbalanced, extent)
+
+
+def dead_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> LiveLoad:
+    """Dead load of an increment beside weight and fill; ``extent`` [m] is that of the picture."""
+    weight, given = solver.self_weight(response.assembly).dead, replace(response.loads_at(increment), fills=())
+    dead = given.dead_at(response.assembly, increment.pose) - weight
+    return _acting(
+        response, increment, dead, (given.dead - weight, given.dead_arms), ROUNDING * np.abs(weight).max(), extent
+    )
+
+
+def _acting(
+    response: solver.Response,
+    increment: solver.Increment,
+    loads: np.ndarray,
+    given: tuple[np.ndarray, np.ndarray | None],
+    least: float,
+    extent: float,
+) -> LiveLoad:
+    """Find where loads (n_blocks, n_dof) [N, N·m] above the least [N] act; given are they as drawn, and their arms."""
+    assembly, pose = response.assembly, increment.pose
+    loads[~assembly.free | increment.fallen] = 0.0
+    forces = loads[:, : assembly.dimension]
+    size = np.linalg.norm(forces, axis=1)
+    blocks = acting = np.flatnonzero(size > max(ROUNDING * np.abs(loads).max(initial=0.0), least))
     if assembly.dimension == 3:
         blocks = _largest(acting, size[acting])
         # The moment about the centroid tells the line on which a load acts, all but its place along that.
         units = forces[blocks] / size[blocks, None]
-        arms = np.cross(units, live[blocks, 3:] / size[blocks, None])
+        arms = np.cross(units, loads[blocks, 3:] / size[blocks, None])
         points = leaving(assembly, pose, blocks, pose.positions[blocks] + arms, -units)
     else:
-        given = response.loads_at(increment)
-        turning = np.zeros_like(given.live) if given.live_arms is None else given.live_arms
+        drawn, turning = given[0], np.zeros(len(loads)) if given[1] is None else given[1]
         # A load without an arm that is known acts on the mass of its block, or at its centroid.
-        inside = [bool(given.live[b, :2].any()) and not turning[b].any() for b in blocks.tolist()]
+        inside = [bool(drawn[b, :2].any()) and not turning[b].any() for b in blocks.tolist()]
         entries = zip(blocks.tolist(), inside, strict=True)
-        points = np.reshape([_entry(assembly, pose, b, live[b], inside=within) for b, within in entries], (-1, 2))
+        points = np.reshape([_entry(assembly, pose, b, loads[b], inside=within) for b, within in entries], (-1, 2))
     load = LiveLoad(points, forces[blocks], blocks, pose, len(acting))
     return load if len(blocks) <= MOST_ARROWS else _gathered(load, 0.12 * extent)
 
@@ -107,8 +129,8 @@ def _of_ties(response: solver.Response, increment: solver.Increment) -> np.ndarr
     return mechanics.block_forces(members, increment.pose, np.maximum(pushes, 0.0))
 
 
-class LiveLoads:
-    """The live loads of some increments as arrows to one scale, which end where the loads act.
+class LoadArrows:
+    """The live, or dead, loads of some increments as arrows to one scale, which end where the loads act.
 
     The increments are gone through once; ``extent`` [m] is that of the picture, and a plane (2, 3), a point [m] and a
     normal, cuts its blocks open.
@@ -120,22 +142,24 @@ class LiveLoads:
         increments: Iterable[solver.Increment],
         extent: float,
         plane: np.ndarray | None = None,
+        *,
+        dead: bool = False,
     ) -> None:
-        self._dimension = response.assembly.dimension
+        self._dead, self._dimension = dead, response.assembly.dimension
         self._swinging = bool(response.limits) and response.collapse is None
         self._loads: dict[tuple[int, float], LiveLoad] = {}
         self._multipliers: dict[tuple[int, float], float] = {}
-        if response.measured == mechanics.LOAD_MULTIPLIER:
+        if dead or response.measured == mechanics.LOAD_MULTIPLIER:
             # Frames of a swinging mechanism have the load of their limit state.
             states = {_place(state): state for state in response.path}
             for increment in increments:
                 place = _place(increment)
                 if place not in self._loads:
                     state = states.get(place, increment)
-                    load = live_load_of(response, state, extent)
+                    load = (dead_load_of if dead else live_load_of)(response, state, extent)
                     self._loads[place] = _in_section(load, response.assembly, plane)
-                    self._multipliers[place] = state.load_multiplier
-        self._places = not response.parameter.is_path and len(self._loads) > 1
+                    self._multipliers[place] = 0.0 if dead else state.load_multiplier
+        self._places = not dead and not response.parameter.is_path and len(self._loads) > 1
         if self._places:
             # The limit varies a hundredfold from place to place: all arrows get one length and show the place alone.
             for place, load in self._loads.items():
@@ -149,10 +173,11 @@ class LiveLoads:
     def words(self) -> str:
         """Entry of the legend; lengths in space are foreshortened and have no scale."""
         acting, drawn = max(((load.n_acting, len(load.blocks)) for load in self._loads.values()), default=(0, 0))
+        what = "dead load" if self._dead else "live load · α"
         if self._dimension == 3:
-            return "live load · α" + (f", {drawn} of {acting} loads" if drawn < acting else "")
+            return what + (f", {drawn} of {acting} loads" if drawn < acting else "")
         scale = " (not to scale)" if self._places else f", longest arrow {force_text(self.largest)}"
-        return f"live load · α{', resultants of neighbours' if drawn < acting else ''}{scale}"
+        return f"{what}{', resultants of neighbours' if drawn < acting else ''}{scale}"
 
     @property
     def tails(self) -> np.ndarray:

@@ -26,6 +26,8 @@ GROUND, SHADOW = (238, 236, 231), (214, 210, 202)
 #: Of supports that move, where their motion is not hatched.
 MOVING = (127, 187, 180)
 LIVE = (190, 24, 118)
+#: Arrows of loads.
+LOADS = {"live": LIVE, "dead": (120, 66, 0)}
 #: Ties that carry, and those that yield.
 TIE, YIELDING = (30, 130, 50), (222, 148, 0)
 #: Loose fill over arches and vaults, its hatch and its rim.

@@ -16,8 +16,9 @@ _SCRIPT = Template('''\
 
 It opens at the last equilibrium. Blocks are coloured by macro-block, the parts that move together in the motion that
 follows; joints that open by more than 2 % of the widest are lines, the wider and the redder the more they open [m];
-hinges and sliding points by state, with arrows of the contact forces [N]. Cells are triangulated first: ParaView
-fills bent polygons wrongly otherwise. Blocks in space are as of glass, so that the faces of open joints are seen.
+hinges and sliding points by state, with arrows of the contact forces [N]; ties that are whole are green. Cells are
+triangulated first: ParaView fills bent polygons wrongly otherwise. Blocks in space are as of glass, so that the faces
+of open joints are seen.
 """
 
 import os
@@ -132,6 +133,15 @@ arrows.ColorArrayName = ["POINTS", ""]
 arrows.AmbientColor = arrows.DiffuseColor = [$force]
 arrows.Ambient, arrows.Diffuse = 1.0, 0.0
 
+if os.path.exists(os.path.join(here, "ties.pvd")):
+    present = Threshold(Input=OpenDataFile(os.path.join(here, "ties.pvd")), Scalars=["CELLS", "state"])
+    present.LowerThreshold, present.UpperThreshold = 1.0, 3.0
+    RenameSource("ties that are there and whole", present)
+    members = Show(present, view)
+    members.LineWidth = 5.0
+    ColorBy(members, None)
+    members.AmbientColor = members.DiffuseColor = [$tie]
+
 if in_space:
     view.CameraParallelProjection = 1
     view.CameraFocalPoint = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, (z0 + z1) / 2.0]
@@ -155,6 +165,7 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
         sliding=_fractions(palette.SLIDING),
         hinge=_fractions(palette.HINGE),
         force=_fractions(palette.FORCE),
+        tie=_fractions(palette.TIE),
         eye=", ".join(f"{component:.4f}" for component in View(AROUND[0], ABOVE).axes[2]),
     )
     return write_atomic(path, text)

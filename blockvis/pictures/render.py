@@ -216,13 +216,14 @@ def animate(
 
 def _mechanism_note(response: solver.Response, n: int) -> str:
     bodies = f"{mechanics.counted(n, 'moving part')}{', darker where faster' if n > MOST_PARTS else ''}"
-    if response.collapse is None and response.limits:
-        friction = f"{response.limits[-1].flow} friction"
-        return f"mechanism at the limit load   ·   {friction}   ·   {bodies}" if n else f"no mechanism   ·   {friction}"
     if response.collapse is None:
-        if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
+        if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM or (response.limits and not response.path):
             when = f"before any {response.parameter.name}" if response.measured.is_force else "under the dead load"
             return f"no equilibrium {when}   ·   {bodies}"
+        if response.limits:
+            friction = f"{response.limits[-1].flow} friction"
+            acts = f"mechanism at the limit load   ·   {friction}   ·   {bodies}"
+            return acts if n else f"no mechanism   ·   {friction}"
         gone = loss_words(response.path[-1]) if response.path else []
         return "   ·   ".join([f"{response.stop}: the motion that would follow", bodies, *gone])
     loss = loss_of(response)

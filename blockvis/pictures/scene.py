@@ -13,7 +13,7 @@ OF_STATICS = (
     *("crack", "crack edge", "sliding", "exposed", "hinge", "hinge rim", "hinge top", "hidden hinge"),
     *("crushing", "crushing top"),
     *("force", "force line", "ground", "backfill"),
-    *("arrow rim", "arrow top", "live rim", "live top"),
+    *("arrow rim", "arrow top", "live rim", "live top", "dead rim", "dead top"),
 )
 
 #: Pictures lower than this part of their width have lines as thick as if they were so high.

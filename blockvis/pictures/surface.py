@@ -9,8 +9,9 @@ import solver
 from blockvis.layout import solids
 from solver import mechanics
 
-#: Edges between faces that differ by less than this cosine are not drawn.
-FLAT = 0.9995
+#: Edges between faces that differ by less than this cosine are not drawn: they are chords of one curved face, up to
+#: 16 degrees as of a drum of 24 sides, and would hide the joints.
+SMOOTH = 0.961
 
 #: Distance from a plane, in sizes of the structure, at which a point lies in it.
 IN_PLANE = 1e-9
@@ -49,7 +50,7 @@ def _reentrant(shapes: mechanics.Polyhedra) -> np.ndarray:
 
 
 def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
-    """(n, 2) int array: vertices at both ends of each edge but those between two faces in one plane."""
+    """(n, 2) int array: vertices at both ends of each edge but those within one plane or curved face."""
     normals = shapes.faces(shapes.vertices).normals[shapes.face_of_corner]
     ends = np.sort(np.stack([shapes.corners, shapes.corners[shapes.next_corner]], axis=1), axis=1).astype(np.int64)
     # Surfaces that are refused are drawn, too: their edges may be of one face, or of more than two.
@@ -58,8 +59,8 @@ def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
     )
     total = np.stack([np.bincount(edge.ravel(), normal) for normal in normals.T], axis=1)
     # Of two unit vectors, half the square of their sum is one more than their product.
-    flat = (counts == 2) & (0.5 * (total**2).sum(axis=1) - 1.0 >= FLAT)
-    return np.asarray(ends[once[~flat]])
+    smooth = (counts == 2) & (0.5 * (total**2).sum(axis=1) - 1.0 >= SMOOTH)
+    return np.asarray(ends[once[~smooth]])
 
 
 def left_blocks(assembly: solver.Assembly, heights: np.ndarray) -> np.ndarray:

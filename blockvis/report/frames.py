@@ -9,7 +9,7 @@ import numpy as np
 
 import solver
 from blockvis.pictures.frame import Frame, framed
-from blockvis.pictures.live_load import LiveLoads
+from blockvis.pictures.live_load import LoadArrows
 from blockvis.pictures.marks import (
     SMALLEST_RESULTANT,
     hinge_ends,
@@ -33,7 +33,7 @@ def model_of_frames(
     """Pack what moves, frame after frame, and the scales of all; points ``held`` (n, d) [m] are in the page, too."""
     assembly = response.assembly
     frame, largest, widest, farthest = _surveyed(assembly, joints, shown)
-    live = LiveLoads(response, shown, float(frame.size.max()))
+    live = LoadArrows(response, shown, float(frame.size.max()))
     frame = frame.holding(np.concatenate([live.tails, held]))
     # Coordinates far from the origin (UTM) would waste the digits.
     origin, extent = np.round(frame.low, 3), float(frame.size.max())
@@ -88,7 +88,7 @@ def _surveyed(
     return frame, largest or 1.0, widest, farthest
 
 
-def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
+def _packed_live(live: LoadArrows, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
     """Arrows of the live load, frame after frame; no more than their first numbers where there are none."""
     found = [live.arrows(increment, increment.pose) for increment in shown]
     first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()

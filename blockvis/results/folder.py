@@ -43,7 +43,7 @@ from .tables import (
 )
 from .ties import COLUMNS as TIE_COLUMNS
 from .ties import TIES, TieCourses, stored_ties, tie_courses, tie_rows, write_ties
-from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
+from .viewer_files import MOVED, ViewerFormat, restore_grids, write_end, write_grids, write_lists
 
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
@@ -112,8 +112,7 @@ class ResultsFolder:
     """A results folder that grows with the run: readable at every moment, whatever ends it.
 
     The increments run over a parameter, the structure has ties, and the VTU files a format. Results that are there
-    already may be replaced, or :class:`ResultsExist` is raised, as where another run is writing to the folder. Who
-    writes the VTU files and their lists is its ``viewer``: this process, or another that is put in its place.
+    already may be replaced, or :class:`ResultsExist` is raised, as where another run is writing to the folder.
 
     The checkpoint is the last file of an increment to be written: files of later increments, which a killed run may
     have left, are removed when the run goes on. Each increment waits for the disk with its state and the checkpoint;
@@ -148,7 +147,6 @@ class ResultsFolder:
         write_ties(self.path, self.ties)
         write_json(self.path / RECORD, asdict(self.record))
         self._start_table()
-        self.viewer = self.own_viewer()
 
     @classmethod
     def reopened(
@@ -183,7 +181,6 @@ class ResultsFolder:
         results._write_table()
         write_lists(results.path, results.increments)
         results._remove_from(count)
-        results.viewer = results.own_viewer()
         return results, checkpoint
 
     def add(self, increment: solver.Increment) -> None:
@@ -197,7 +194,8 @@ class ResultsFolder:
         write_atomic(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
-        self.viewer.add(self.increments[-1])
+        write_grids(self.path, number, self.assembly, self.increments[-1], self.vtu)
+        write_lists(self.path, self.increments)
         self._write_table()
         if increment.checkpoint is not None:
             write_atomic(self.path / CHECKPOINT, packed(increment.checkpoint, compressed=False, increments=number + 1))
@@ -213,8 +211,6 @@ class ResultsFolder:
         """Write the tables of the kind of analysis, by their files, and the summary with what it adds; returns that."""
         self._refuse_gone()
         self.tell(response)
-        if not self.viewer.finish():
-            restore_grids(self.path, self.assembly, self.increments, self.vtu)
         if response.path and response.collapse is not None:
             # What follows the last equilibrium is known by now, and with it the states of its joints.
             write_end(self.path, response, self.vtu)
@@ -242,10 +238,6 @@ class ResultsFolder:
         """Write the laws and loads of a response where no case file tells them."""
         if not self.record.case:
             write_given(self.path, response)
-
-    def own_viewer(self) -> ViewerWriter:
-        """Make what writes the files for viewers in this process."""
-        return ViewerFiles(self.path, self.assembly, self.vtu, self.increments)
 
     def _start_table(self) -> None:
         self._rows, self._support_rows, self._tie_rows = (list[Sequence[Any]]() for _ in range(3))

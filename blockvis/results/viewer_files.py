@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -31,36 +30,6 @@ class ViewerFormat:
 
 #: As viewers show them best.
 MOVED = ViewerFormat()
-
-
-class ViewerWriter(Protocol):
-    """Who writes the files for viewers while a run goes on."""
-
-    def add(self, increment: solver.Increment) -> None:
-        """Take the next increment, whose state is in the folder."""
-
-    def finish(self) -> bool:
-        """Wait until all is written; False where that will not be, because a process has ended."""
-
-
-class ViewerFiles:
-    """The files for viewers of a results folder beyond those of some increments, written increment by increment."""
-
-    def __init__(
-        self, folder: Path, assembly: solver.Assembly, vtu: ViewerFormat, increments: Sequence[solver.Increment]
-    ) -> None:
-        self.folder, self.assembly, self.vtu = folder, assembly, vtu
-        self._listed = list(increments)
-
-    def add(self, increment: solver.Increment) -> None:
-        """Write the files of the next increment, which is kept without arrays, then the lists that name them."""
-        write_grids(self.folder, len(self._listed), self.assembly, increment, self.vtu)
-        self._listed.append(increment)
-        write_lists(self.folder, self._listed)
-
-    def finish(self) -> bool:
-        """Nothing is left to write."""
-        return True
 
 
 def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable: bool = False) -> None:
@@ -103,7 +72,7 @@ def write_grids(
     falls: np.ndarray | None = None,
 ) -> None:
     """Write the VTU files of an increment by its number; ``falls`` as of :func:`~.datasets.block_grid`."""
-    # VTK is loaded where its files are written: another process may do that.
+    # VTK is loaded where its files are written, not by whoever reads results.
     from .datasets import grids_of
 
     ties = stored_ties(folder)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,6 @@ from blockvis.dynamics.fall import NEVER_STOOD, STANDS, Fall, fall_of, may_fall,
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.about import quantities_of
 from blockvis.results.fall_files import stored_fall, write_fall
-from blockvis.results.folder import ResultsFolder
 from blockvis.results.reaction_range import stored_range
 from blockvis.results.record import case_text
 from blockvis.results.viewer_files import ViewerFormat
@@ -57,8 +56,8 @@ class Clock:
 class Drawing:
     """What a run makes beside its numbers: fall, pictures, report and film, which a process of its own draws.
 
-    It is told of the run by :meth:`begin`, :meth:`follow`, :meth:`finish` and :meth:`close`, in this order. The process
-    has time until the case is solved: it loads what it needs and writes what only viewers open meanwhile.
+    It is told of the run by :meth:`begin`, :meth:`finish` and :meth:`close`, in this order. The process has time until
+    the case is solved: it loads what it needs meanwhile.
     """
 
     def __init__(self, *, film: bool = True, pictures: bool = True) -> None:
@@ -76,12 +75,6 @@ class Drawing:
             from blockvis.pictures.film_process import FilmProcess
 
             self._process = FilmProcess()
-
-    def follow(self, results: ResultsFolder) -> None:
-        """Have the files for viewers written by the process, before the first increment is added."""
-        if self._process is not None:
-            self._process.follow(results.path, results.assembly, results.vtu, len(results.increments))
-            results.viewer = self._process
 
     def is_written(self, case: Case, folder: Path) -> bool:
         """Whether all that is drawn is there."""
@@ -115,42 +108,39 @@ class Drawing:
         if not response.increments:
             return ()
         underlay = self._shown_underlay(case, response) if self._pictures else None
-        stored = stored_fall(folder)
-        animation, apart = self._animation(case), self._process
         eye = seen_from(case, response) if self._pictures else {}
-        if apart is not None:
-            # It works out the fall as well, and what needs none is drawn here meanwhile.
-            apart.draw(response, folder / str(animation), stored is None, stored, {"underlay": underlay, **eye})
-        if self._pictures:
-            with clock.counting("mechanism"):
-                from blockvis.pictures.render import draw_mechanism
-
-                draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **eye)
-                if response.parameter.is_path:
-                    from blockvis.pictures.crack_drawing import draw_cracks
-
-                    draw_cracks(response, -1, folder / "cracks.png", **eye)
         with clock.counting("fall"):
-            fall = _fall(response, apart) if stored is None else stored
-            if fall is not None and stored is None:
+            fall = stored_fall(folder)
+            if fall is None and (fall := _fall(response)) is not None:
                 write_fall(fall, response, folder, viewer_format(case))
         if not self._pictures:
             return ()
+        animation, apart = self._animation(case), self._process
+        if apart is not None:
+            # What needs no film is drawn here meanwhile.
+            apart.draw(response, folder / str(animation), fall, {"underlay": underlay, **eye})
+        with clock.counting("mechanism"):
+            from blockvis.pictures.render import draw_mechanism
+
+            draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **eye)
+            if response.parameter.is_path:
+                from blockvis.pictures.crack_drawing import draw_cracks
+
+                draw_cracks(response, -1, folder / "cracks.png", **eye)
         with clock.counting("report"):
             write_report_of(response, folder, fall)
-        problem = ""
-        if apart is not None:
-            problem = _awaited(apart, clock)
-        if response.path and (apart is None or problem):
+        if response.path:
             with clock.counting("curve"):
                 draw_curves(response, folder, ["curve.png"])
-        if animation is not None and apart is None:
+        if apart is not None:
+            return _awaited(apart, clock)
+        if animation is not None:
             with clock.counting("film"), DrawingProgress() as progress:
                 from blockvis.pictures.render import animate
 
                 look: dict[str, Any] = {"underlay": underlay, "poster": folder / "poster.png", **eye}
                 animate(response, folder / animation, fall=fall, progress=progress.frame, **look)
-        return (problem,) if problem else ()
+        return ()
 
 
 def draw_curves(response: solver.Response, folder: Path, names: Sequence[str]) -> None:
@@ -203,32 +193,22 @@ def seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
     return asked
 
 
-def _awaited(film: FilmProcess, clock: Clock) -> str:
-    """Wait for the process that draws curve and film; returns why it has ended without them, or nothing."""
+def _awaited(film: FilmProcess, clock: Clock) -> tuple[str, ...]:
+    """Wait for the process that draws the film; returns why it has ended without it, or nothing."""
     from blockvis.pictures.film_process import FilmFailed
 
     try:
         with clock.counting("film"), DrawingProgress() as progress:
             film.wait(progress.frame)
     except FilmFailed as error:
-        return str(error)
-    return ""
+        return (str(error),)
+    return ()
 
 
-def _fall(response: solver.Response, film: FilmProcess | None) -> Fall | None:
-    """Find the fall of a response: that of the process that draws the film, or worked out here."""
+def _fall(response: solver.Response) -> Fall | None:
+    """Work out a fall; say so where a collapse has none, where it is cut off, or leaves out what holds together."""
     with DrawingProgress() as progress:
-        if film is not None:
-            from blockvis.pictures.film_process import FilmFailed
-
-            # What became of the process is told where the film is waited for.
-            with suppress(FilmFailed):
-                return _told(response, film.fall(progress.fall))
-        return _told(response, fall_of(response, progress.fall))
-
-
-def _told(response: solver.Response, fall: Fall | None) -> Fall | None:
-    """Give a fall; say so where a collapse has none, where it is cut off, or leaves out what holds blocks together."""
+        fall = fall_of(response, progress.fall)
     if fall is None and may_fall(response):
         warnings.warn(f"{STANDS}: no fall is shown", stacklevel=2)
     if response.collapse is not None and not response.path:

@@ -62,7 +62,7 @@ class Run:
         Whether there was nothing left to solve when it was asked to go on.
     stages : dict from str to float [s]
         Wall-clock seconds of each part: read, solve, write, fall, report, curve, mechanism, film. What another process
-        works out meanwhile, VTU files, fall, curve and film, counts as the wait for it only.
+        draws meanwhile, the film, counts as the wait for it only.
     """
 
     response: solver.Response
@@ -227,11 +227,9 @@ def _begun(case: Case, outputs: Sequence[Drawing]) -> Iterator[None]:
 
 @contextmanager
 def _writing(results: ResultsFolder, outputs: Sequence[Drawing]) -> Iterator[None]:
-    """Have the outputs follow a results folder, and say what to do where it is interrupted, full or gone."""
+    """Say what to do where writing to a results folder is interrupted, or that is full or gone."""
     try:
         with _resumable(results.path):
-            for output in outputs:
-                output.follow(results)
             yield
     except OSError as error:
         for output in outputs:

@@ -19,17 +19,18 @@ def box_pairs(vertices: np.ndarray, offsets: np.ndarray, reach: float | np.ndarr
     one long block (the ground) costs n pairs, not n².
     """
     low, high = boxes(vertices, offsets)
-    low, high = low - reach / 2.0, high + reach / 2.0
+    ranges = list(zip((low - reach / 2.0).T.copy(), (high + reach / 2.0).T.copy(), strict=True))
     sweeps = []
-    for axis in range(low.shape[1]):
-        order = np.argsort(low[:, axis], kind="stable")
-        ends = np.searchsorted(low[order, axis], high[order, axis], side="right")
-        sweeps.append((order, np.maximum(ends - np.arange(1, len(order) + 1), 0)))
-    order, counts = min(sweeps, key=lambda sweep: int(sweep[1].sum()))
+    for axis, (low, high) in enumerate(ranges):
+        order = np.argsort(low, kind="stable")
+        ends = np.searchsorted(low[order], high[order], side="right")
+        sweeps.append((order, np.maximum(ends - np.arange(1, len(order) + 1), 0), axis))
+    order, counts, swept = min(sweeps, key=lambda sweep: int(sweep[1].sum()))
     owner, position = expand_ranges(counts)
     i, j = order[owner], order[owner + 1 + position]
-    for axis in range(low.shape[1]):
-        touching = (low[i, axis] <= high[j, axis]) & (low[j, axis] <= high[i, axis])
+    # The axis of the sweep, along which few are left out, comes last.
+    for low, high in ranges[swept + 1 :] + ranges[: swept + 1]:
+        touching = (low[i] <= high[j]) & (low[j] <= high[i])
         i, j = i[touching], j[touching]
     return np.minimum(i, j), np.maximum(i, j)
 

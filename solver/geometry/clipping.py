@@ -119,17 +119,16 @@ def _on_face(
     """Owners, features and points of corners alone on faces, with the edges that cross where on their boundary."""
     solids = placed.solids
     pair, p = np.nonzero(alone)
-    depths = a.inside[pair, p]
-    own, other = a.corner[pair, p], b.edge[pair, depths.argmin(axis=1)]
+    depths, corner, code = a.inside[pair, p], a.corner[pair, p], np.full(len(pair), -1)
+    near = np.flatnonzero(depths.min(axis=1) <= end[pair, 0])
+    own, other = corner[near], b.edge[pair[near], depths[near].argmin(axis=1)]
     along = unit(placed.along(other))
     candidates = np.stack([own, solids.previous_corner[own]], axis=1)
     crossing = cross(unit(placed.along(candidates)), along[:, None])
-    sine = np.sqrt(dot(crossing, crossing))
-    (steepest, crossed), at = at_largest(sine, candidates), placed.starts(own)
-    on_boundary = (depths.min(axis=1) <= end[pair, 0]) & (steepest >= SMALLEST_SINE)
-    on_boundary &= (placed.kinds_at(other, at) == ENDS) & (placed.kinds_at(crossed, at) == ENDS)
-    code = np.where(on_boundary, other * np.int64(len(solids.corners)) + crossed, -1)
-    return pair, feature_rows(ON_FACE, solids.corners[own], face[pair], code), a.points[pair, p]
+    (steepest, crossed), at = at_largest(np.sqrt(dot(crossing, crossing)), candidates), placed.starts(own)
+    ends = (placed.kinds_at(other, at) == ENDS) & (placed.kinds_at(crossed, at) == ENDS)
+    code[near] = np.where((steepest >= SMALLEST_SINE) & ends, other * len(solids.corners) + crossed, -1)
+    return pair, feature_rows(ON_FACE, solids.corners[corner], face[pair], code), a.points[pair, p]
 
 
 def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, ...]:

@@ -51,7 +51,7 @@ class FacingParts:
             owner, position = expand_ranges(np.diff(faces_of_part)[part])
             pair, opposed = k[owner], faces_of_part[part[owner]] + position
             faces = np.roll([self.lead[row, pair], opposed], row, axis=0)
-            cosine = dot(*normals[faces])
+            cosine = dot(*(taken(normals, face) for face in faces))
             # Neighbours across a corner open by nearly a right angle, and touch along an edge alone.
             new = (faces != self.faces[:, pair]).any(axis=0) & (cosine <= -0.5) & ~placed.parts.inner[opposed]
             columns.append((pair[new], faces[:, new], cosine[new]))
@@ -140,7 +140,7 @@ def _opposed_faces(placed: PlacedParts, leading: np.ndarray, j: np.ndarray) -> n
     normals = placed.faces.normals
     opposed = np.empty(len(j), dtype=np.int64)
     for k, face in alike((placed.solids.faces_of_block, j), filled=True):
-        against = -dot(normals[face], normals[leading[k]][:, None])
+        against = -dot(taken(normals, face), taken(normals, leading[k])[:, None])
         _, opposed[k] = at_largest(np.where(placed.parts.inner[face], -np.inf, against), face)
     return opposed
 

@@ -105,7 +105,7 @@ class Polyhedra(Solids):
         beside, resting = shallow & others, np.flatnonzero(shallow & ~others)
         beside[resting] = _rests_on_more(placed, pairs[resting])
         over, crossed = _edges_over(placed, pairs[beside], reach)[0], _crossed_edges(placed, pairs[others], reach)
-        single = _measured(placed, np.vstack([over, crossed]))
+        single = _measured(placed, np.unique(np.vstack([over, crossed]), axis=0))
         beyond = [placed.kinds_at(edge, single.points) != ENDS for edge in single.features.T[1:3]]
         single = single[near(single) & ~((single.features[:, 0] == ACROSS) & np.any(beyond, axis=0))]
         contacts = joined_contacts([*found, single])
@@ -186,15 +186,15 @@ def _measured(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | Non
     corners, face_of, on_face = solids.corners, solids.face_of_corner, kind == ON_FACE
     face_b = np.where(on_face, second, face_of[np.where(on_face, 0, second)])
     vertex_a = np.where(on_face, first, corners[np.where(on_face, 0, first)])
-    x_a, x_b = placed.vertices[vertex_a], faces.middles[face_b]
-    normals, tangents = faces.normals[face_b], faces.tangents[face_b]
-    face_normals, face_tangents = normals.copy(), tangents.copy()
+    x_a, x_b = taken(placed.vertices, vertex_a), taken(faces.middles, face_b)
+    face_normals, face_tangents = taken(faces.normals, face_b), taken(faces.tangents, face_b)
+    normals, tangents = face_normals.copy("K"), face_tangents
     along = np.zeros_like(normals)
 
     # A corner on a corner, or edges that are nearly parallel.
     k = np.flatnonzero(~on_face)
     x_b[k] = placed.starts(second[k])
-    normals[k] = unit(face_normals[k] - faces.normals[face_of[first[k]]])
+    normals[k] = unit(taken(face_normals, k) - taken(faces.normals, face_of[first[k]]))
 
     # A corner on the boundary of a face.
     k = np.flatnonzero(on_face & (rest >= 0))
@@ -222,17 +222,18 @@ def _measured(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | Non
     rotated = dot(tangents, along)[:, None] * along + dot(tangents, across)[:, None] * cross(normals, along)
     projected = tangents - dot(tangents, normals)[:, None] * normals
     tangents = unit(np.where(has_edge[:, None], rotated, projected))
-    frames = np.stack([normals, tangents, cross(normals, tangents)], axis=1)
+    frames = np.empty((len(kind), 3, 3))
+    frames[:, 0], frames[:, 1], frames[:, 2] = normals, tangents, cross(normals, tangents)
 
     # From the middle of the face to the fixed point of block b, then to that of block a.
-    fixed, apart = x_b - faces.middles[face_b], x_a - x_b
+    fixed, apart = x_b - taken(faces.middles, face_b), x_a - x_b
     place = np.stack([dot(fixed, face_tangents), dot(fixed, cross(face_normals, face_tangents))], axis=1)
-    slip = place + np.stack([dot(apart, frames[:, 1]), dot(apart, frames[:, 2])], axis=1)
+    slip = place + np.stack([dot(apart, tangents), dot(apart, frames[:, 2])], axis=1)
     return Contacts(
         features=features,
         block_a=block_of_part[solids.block_of_vertex[vertex_a]],
         block_b=block_of_part[solids.block_of_face[face_b]],
-        points=np.where(on_face[:, None], x_a, (x_a + x_b) / 2.0),
+        points=np.ascontiguousarray(np.where(on_face[:, None], x_a, (x_a + x_b) / 2.0)),
         frames=frames,
         gaps=dot(apart, normals),
         slip=slip,
@@ -320,7 +321,7 @@ def _edges_over(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[
     own, other = edge[owner[crosses]], corner[crosses]
     meets = feature_rows(ACROSS, own, other, places_of(*_crossings(placed, own, other)))
     on_cut = np.bincount(pair, along_face & np.logical_or.reduceat(goes_on, starts), minlength=len(pairs.part)) > 0
-    return np.unique(np.concatenate([stands, meets]), axis=0), on_cut
+    return np.concatenate([stands, meets]), on_cut
 
 
 def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from math import prod
 
 import numpy as np
@@ -25,17 +26,18 @@ def alike(*groups: tuple[np.ndarray, np.ndarray], filled: bool = False) -> Itera
     for count in counts:
         keys = keys * (int(count.max(initial=0)) + 1) + (np.frexp(count)[1] if filled else count)
     order = np.argsort(keys, kind="stable")
-    for same in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
-        if len(same):
-            sizes = [int(count[same].max()) for count in counts]
-            portion = max(1, PORTION // max(1, prod(sizes)))
-            for items in np.split(same, np.arange(portion, len(same), portion)):
-                # Items come next to each other in memory: numpy is fast along the longest axis alone.
-                members = (
-                    (offsets[owner[items]] + np.minimum(np.arange(size)[:, None], count[items] - 1)).T
-                    for (offsets, owner), size, count in zip(groups, sizes, counts, strict=True)
-                )
-                yield items, *members
+    changes = np.flatnonzero(np.diff(keys[order], append=-1)) + 1
+    for first, end in pairwise([0, *changes.tolist()]):
+        sizes = [int(count[order[first:end]].max()) for count in counts]
+        portion = max(1, PORTION // max(1, prod(sizes)))
+        for start in range(first, end, portion):
+            items = order[start : min(start + portion, end)]
+            # Items come next to each other in memory: numpy is fast along the longest axis alone.
+            members = (
+                (offsets[owner[items]] + np.minimum(np.arange(size)[:, None], count[items] - 1)).T
+                for (offsets, owner), size, count in zip(groups, sizes, counts, strict=True)
+            )
+            yield items, *members
 
 
 def at_largest(values: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:

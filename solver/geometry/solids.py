@@ -144,9 +144,9 @@ class Solids(Bodies):
     def faces(self, vertices: np.ndarray) -> Faces:
         """Planes of the faces where the corners now are, (n_vertices, 3) [m]."""
         starts, counts = self.face_offsets[:-1], np.diff(self.face_offsets)
-        points = vertices[self.corners]
-        arms = points - np.repeat(points[starts], counts, axis=0)
-        areas = np.add.reduceat(cross(arms, arms[self.next_corner]), starts) / 2.0
+        points = taken(vertices, self.corners)
+        arms = points - taken(points, starts[self.face_of_corner])
+        areas = np.add.reduceat(cross(arms, taken(arms, self.next_corner)), starts) / 2.0
         normals = unit(areas)
         along = points[self.next_corner[self.longest_edges]] - points[self.longest_edges]
         along = along - dot(along, normals)[:, None] * normals

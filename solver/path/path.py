@@ -15,7 +15,7 @@ from solver.program.model import Model
 from solver.program.static_program import EquilibriumBounds
 from solver.programs.problem import SolveError
 from solver.results.increment import Bonds, Increment, Status
-from solver.ties import TieForces, is_member
+from solver.ties import TieForces
 from solver.tolerances import ACCEPTED_ERROR, CLOSING_GAP, COMPUTED_GAP, FRICTION_MEMORY, JUMP
 
 from .collapse import MECHANISM, Fall
@@ -386,7 +386,7 @@ class Path:
         locked = self._locked(place, new, error.penetration > CLOSING_GAP)
         if locked is not None:
             return state, locked
-        works = self._works(place, new, motion)
+        works = (*self._works(new, motion), error.taken)
         measure = self._error(place, length, error, works)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length / 4.0), None
@@ -495,30 +495,25 @@ class Path:
         """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""
         return not self.model.has_live and bool(np.isneginf(self.checks.bounds(place).low))
 
-    def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
-        """Works of dead and live loads, on supports and of friction in a step, with the forces at its end."""
-        model, contacts = self.model, after.contacts
-        assert contacts is not None
+    def _works(self, after: Place, motion: np.ndarray) -> tuple[float, float, float]:
+        """Works of dead and live loads and on supports in a step, with the forces at its end."""
+        model = self.model
         live, live_size = model.scaled_live(after.pose)
         free = model.assembly.free[:, None]
-        started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
-        slipped, closed = (contacts.slip - started.slip) / model.length, (contacts.gaps - started.gaps) / model.length
         return (
             float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
             self._work_on_supports(after, motion),
-            -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
         )
 
     def _work_on_supports(self, place: Place, motion: np.ndarray) -> float:
         """Work of the forces at a place on supports in a motion."""
-        if place.contacts is None:
+        contacts, free = place.contacts, self.model.assembly.free
+        if contacts is None:
             return 0.0
-        supports, contacts = ~self.model.assembly.free, place.contacts
-        touching = supports[contacts.block_a] | supports[contacts.block_b]
-        wrench = wrench_matrix(contacts[touching], place.pose, self.model.length)
-        resultant = wrench @ place.forces[touching].ravel()
-        return float((resultant.reshape(motion.shape) * motion)[supports].sum())
+        beside = ~(free[contacts.block_a] & free[contacts.block_b])
+        resultant = wrench_matrix(contacts[beside], place.pose, self.model.length) @ place.forces[beside].ravel()
+        return float((resultant.reshape(motion.shape) * motion)[~free].sum())
 
     def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""

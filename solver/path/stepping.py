@@ -14,6 +14,7 @@ many joints slide; this has one, and the limit of short steps exists.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -78,6 +79,7 @@ class StepError:
     """Measures of the error of a step: the work in units of the program, all else in block sizes."""
 
     work: float  #: of friction by which bounds at the end of the step were not what was expected
+    taken: float  #: work of friction, and of members, by the forces at the end of the step
     turn: float  #: change of the movement against that of the steps before
     moved: float  #: movement of the fastest block
     penetration: float  #: deepest at a contact point that carries
@@ -143,7 +145,11 @@ class Stepper:
         self._shares = np.column_stack([np.ones_like(turning)] * d + [turning] * (model.n_dof - d)).ravel()
         self.unit = model.length / driver.lever(model)
         self.programs = 0
-        self._last: tuple[Pose, Contacts] | None = None
+        # Contact points with a larger gap are not looked at.
+        reach = model.length / 4.0
+        self._found = lru_cache(2)(
+            lambda pose: model.standing(find_contacts(assembly, moved_vertices(assembly, pose), reach))
+        )
         support_motion = driver.rate(0.0)[assembly.moving, :d]
         # Of motions that cancel, rounding would choose a direction of the sum.
         sense = support_motion.sum(axis=0) / max(float(np.linalg.norm(support_motion, axis=1).sum()), 1e-300)
@@ -180,12 +186,8 @@ class Stepper:
         return joined_contacts([of_blocks, self.members.measured(contacts[members], pose, tie_lengths)])
 
     def contacts(self, pose: Pose) -> Contacts:
-        """Return the contact points of blocks at a pose; those of the last pose are kept."""
-        if self._last is None or self._last[0] is not pose:
-            # Contact points with a larger gap are not looked at.
-            assembly, reach = self.model.assembly, self.model.length / 4.0
-            self._last = pose, self.model.standing(find_contacts(assembly, moved_vertices(assembly, pose), reach))
-        return self._last[1]
+        """Return the contact points of blocks at a pose; those of the last two are kept: a step goes on or anew."""
+        return self._found(pose)
 
     def friction(self, contacts: Contacts) -> np.ndarray:
         """(n,) array: friction coefficients."""
@@ -313,11 +315,11 @@ class Stepper:
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         new = self._arrived(place, replace(new, velocity=velocity, works=place.works), points, left, share)
         memory = tolerances.FRICTION_MEMORY if model.has_live else memory
-        work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size, memory)
+        works = self._works(points, new, joints.cohesion - left.cohesion, size, memory)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((movement - before) * self._shares)
         penetration = self._penetration(points, new)
-        return new, motion / model.lengths, StepError(work, turn, movement_size, penetration, is_linearised)
+        return new, motion / model.lengths, StepError(*works, turn, movement_size, penetration, is_linearised)
 
     def gives(self, place: Place) -> bool:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""
@@ -465,19 +467,25 @@ class Stepper:
         bonds = self.mortar.bonds(place, points.start, left.left)
         return replace(new, followed=after, tie_lengths=lengths, bonds=bonds)
 
-    def _work_in_error(self, points: _StepPoints, new: Place, lost: np.ndarray, size: float, memory: float) -> float:
-        """Work of friction bounds that are not what was expected, and of lost cohesion (n,)."""
+    def _works(
+        self, points: _StepPoints, new: Place, lost: np.ndarray, size: float, memory: float
+    ) -> tuple[float, float]:
+        """Works of friction bounds that are not what was expected, and of lost cohesion (n,); and of friction."""
         assert new.contacts is not None
+        slip, closed = new.contacts.slip - points.start.slip, new.contacts.gaps - points.start.gaps
+        taken = (new.forces[:, 1:] * (slip / self.model.length)).sum()
+        taken += (new.forces[:, 0] * (closed / self.model.length))[is_member(points.start)].sum()
         # What slips faster than the supports move does so however short the step is.
-        slip = np.linalg.norm(new.contacts.slip - points.start.slip, axis=1) / self.model.length
+        slid = np.minimum(np.linalg.norm(slip, axis=1) / self.model.length, size)
         change = np.where(points.is_new, 0.0, points.friction * (new.followed - points.expected)) - lost
         # What the points of one joint hand to each other does not change its friction.
-        works = np.bincount(new.contacts.joints()[1], change * np.minimum(slip, size))
+        works = np.bincount(new.contacts.joints()[1], change * slid)
         # Differences of friction grow while bounds follow, by e in a step as long as the memory; longer ones miss that.
         # What errs to one side counts whole, but for friction of the limit load that pushovers begin with and lose at
         # once; of the rest, half, as bounds depart in the course of the step, and half of that cancels.
         one_sided = 0.0 if self.model.has_live else abs(float(works.sum()))
-        return (1.0 + size / memory) ** 3 * max(0.25 * float(np.abs(works).sum()), one_sided)
+        in_error = (1.0 + size / memory) ** 3 * max(0.25 * float(np.abs(works).sum()), one_sided)
+        return in_error, -float(taken)
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""

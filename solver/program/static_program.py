@@ -100,17 +100,19 @@ class StaticProgram:
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
 
-        First the least sum of unbalanced forces; where that is none, the least and the largest value. The least
-        reaction is that of Portioli & Cascini (2017) at this geometry.
+        In space the forces of the least one prove that there is an equilibrium; where they do not, and in the plane,
+        where programs without a solution take long, first the least sum of unbalanced forces. The least reaction is
+        that of Portioli & Cascini (2017) at this geometry.
         """
-        balanced, unbalanced = self.most_balanced()
+        least = self._least_in_balance() if self.size > 2 else None
+        balanced, unbalanced = self.most_balanced() if least is None else (least, 0.0)
         if unbalanced > FALLING_FRACTION:
             value = self.value(balanced)
             return EquilibriumBounds(unbalanced, value, value, balanced.gap, np.array([balanced.forces + self.least]))
         values, found = {1.0: np.nan, -1.0: np.nan}, []
         for sense in values:
             try:
-                found.append(self.bound(sense, balanced))
+                found.append(self.bound(sense, balanced) if least is None or sense < 0.0 else least)
                 values[sense] = self.value(found[-1])
             except Unbounded:
                 values[sense] = -sense * np.inf
@@ -123,21 +125,30 @@ class StaticProgram:
         gap = max(state.gap for state in (balanced, *found))
         return EquilibriumBounds(unbalanced, values[1.0], values[-1.0], gap, forces)
 
+    def _least_in_balance(self) -> ProgramState | None:
+        """Find the state of the least value; None where its forces are out of balance by more than rounding."""
+        try:
+            least = self.bound(1.0)
+        except (Unbounded, SolveError):
+            return None
+        left = self.matrix @ least.forces.ravel() + self.dead + least.multiplier * self.live
+        return least if np.abs(left).sum() <= FALLING_FRACTION * self.model.total_load else None
+
     def value(self, state: ProgramState) -> float:
         """Reaction [N or N·m] or multiplier of a state."""
         if self.senses:
             return state.multiplier * self.unit
         return float(self.work @ (state.forces + self.least).ravel()) * self.unit
 
-    def bound(self, sense: float, balanced: ProgramState) -> ProgramState:
+    def bound(self, sense: float, balanced: ProgramState | None = None) -> ProgramState:
         """Least, by sense 1, or largest value in equilibrium, by -1, less what open points cost.
 
-        The rounding that leaves the balanced state out of balance may do so here. Raises ``Unbounded``.
+        The rounding that leaves a balanced state out of balance may do so here. Raises ``Unbounded``.
         """
         of_forces = sense * self.work
         of_forces[:: self.size] += self.price
-        solution = self._solved(of_forces, sense * np.array(self.senses), [], balanced.unbalanced)
-        return self._state(solution)
+        left = 0.0 if balanced is None else balanced.unbalanced
+        return self._state(self._solved(of_forces, sense * np.array(self.senses), [], left))
 
     def most_balanced(self, *, with_live: bool = True) -> tuple[ProgramState, float]:
         """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding."""

@@ -697,3 +697,14 @@ def test_small_numbers_in_one_channel_are_labels(tmp_path, step):
     Image.fromarray(pixels).save(tmp_path / "ids.png")
     layout = read_layout(tmp_path / "ids.png", width=1.0)
     assert layout.names == tuple(f"#{step * k:02x}0000" for k in (1, 2, 3))
+
+
+def test_stones_that_run_together_through_open_joints_are_told(tmp_path):
+    # A grid of joints with a gap in each: either value has holes, and the other was told to be the background.
+    pixels = np.full((200, 200), 255, dtype=np.uint8)
+    for k in range(25, 200, 50):
+        pixels[k - 2 : k + 2, 10:190] = pixels[10:190, k - 2 : k + 2] = 0
+    pixels[:, 48:52] = pixels[48:52] = 255
+    Image.fromarray(pixels).save(tmp_path / "mask.png")
+    with pytest.raises(ValueError, match=r"has holes; .* close the joints, through whose gaps they are one"):
+        read_layout(tmp_path / "mask.png", width=1.0, background="black")

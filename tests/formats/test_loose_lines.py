@@ -274,6 +274,18 @@ def test_stones_drawn_by_lines_close_beside_outlines(tmp_path):
     assert note.endswith(f'counts as a stone; leave out what is an opening: ignore = ["{door}"]')
 
 
+def test_a_stone_beside_an_arc_is_on_the_layer_of_its_joints(tmp_path):
+    # Most of its edges are chords of the extrados, most of its border is not.
+    def draw(space):
+        space.add_arc((0, 0), 500, 0, 90, dxfattribs={"layer": "RING"})
+        for start, end in (((500, 0), (2000, 0)), ((2000, 0), (2000, 500)), ((2000, 500), (0, 500))):
+            space.add_line(start, end, dxfattribs={"layer": "JOINTS"})
+
+    drawing = read_layout(dxf(tmp_path, draw))
+    assert len(drawing.outlines[0]) > 12
+    assert drawing.groups == ("JOINTS",)
+
+
 def pairs_of_lines(space, half, framed):
     """A wall of 6 courses with joints of twice ``half``; without a frame the beds are open at their ends."""
     if framed:

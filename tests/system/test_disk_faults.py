@@ -109,23 +109,14 @@ def test_what_could_not_be_written_is_named(case, tmp_path, capsys, monkeypatch)
     assert said in capsys.readouterr().err
 
 
-class _Moving:
-    """What a run makes beside its numbers: it moves the folder before the first increment."""
-
-    def follow(self, results):
-        results.path.rename(results.path.with_name("moved"))
-
-    def begin(self, case):
-        """Nothing to prepare."""
-
-    def close(self):
-        """Nothing to end."""
-
-
-def test_a_folder_that_is_moved_during_the_run_is_not_made_again(case, tmp_path):
+def test_a_folder_that_is_moved_during_the_run_is_not_made_again(case, tmp_path, monkeypatch):
     """Made again it held half of the run, which could be neither opened nor resumed."""
+    folders = sys.modules[blockvis.run_case.__module__].ResultsFolder
+    # Before the first increment.
+    monkeypatch.setattr(folders, "tell", lambda results, _: results.path.rename(results.path.with_name("moved")))
     with pytest.raises(OSError, match=r"out' was moved or removed during the run; .* --resume FOLDER"):
-        blockvis.run_case(case, tmp_path / "out", outputs=[_Moving()])
+        blockvis.run_case(case, tmp_path / "out", outputs=[])
+    monkeypatch.undo()
     assert not (tmp_path / "out").exists()
     assert run_command("--resume", tmp_path / "moved", "--no-pictures", "--no-check-steps") == 0
 

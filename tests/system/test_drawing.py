@@ -44,7 +44,7 @@ def case(tmp_path):
 def test_another_process_draws_the_same_film(tmp_path):
     response = parted(wall(4, 3), 3, 2)
     process, told = FilmProcess(), []
-    process.draw(response, tmp_path / "other.mp4", False, None, {})
+    process.draw(response, tmp_path / "other.mp4", None, {})
     process.wait(lambda *count: told.append(count))
     blockvis.animate(response, tmp_path / "own.mp4")
     assert (tmp_path / "other.mp4").read_bytes() == (tmp_path / "own.mp4").read_bytes()
@@ -54,41 +54,20 @@ def test_another_process_draws_the_same_film(tmp_path):
 @pytest.mark.slow
 def test_what_fails_in_the_process_is_raised_here(tmp_path):
     process = FilmProcess()
-    process.draw(arch_response(), tmp_path / "film.avi", False, None, {})
+    process.draw(arch_response(), tmp_path / "film.avi", None, {})
     with pytest.raises(ValueError, match=r"film\.avi.*\.mp4, \.gif, \.webp"):
         process.wait(lambda *_: None)
 
 
-@pytest.mark.slow
-def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_results):
-    written = {path: path.read_bytes() for path in [*arch_results.rglob("*.vtu"), *arch_results.glob("*.pvd")]}
-    assert len(written) == 3 * len(arch.increments) + 3
-    for path in written:
-        path.unlink()
-    process = FilmProcess()
-    process.follow(arch_results, arch.assembly, film_process.ViewerFormat(), 0)
-    for increment in arch.increments:
-        process.add(increment)
-    assert process.finish()
-    # That a collapse follows the last equilibrium is known at the end of a run only.
-    known = {path: content for path, content in written.items() if f"_{len(arch.path) - 1:05d}." not in path.name}
-    assert {path: path.read_bytes() for path in known} == known
-    # An increment more than there are states.
-    process.add(arch.increments[-1])
-    with pytest.raises(ValueError, match=rf"state_{len(arch.increments):05d}\.npz' cannot be read"):
-        process.finish()
-    process.close()
-    assert not process.finish()
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to one process")
 @pytest.mark.slow
-def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, arch_results, capfd):
+def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(tmp_path, capfd):
     process = FilmProcess()
-    process.follow(arch_results, arch.assembly, film_process.ViewerFormat(), 0)
     process._worker._process.send_signal(signal.SIGINT)
-    assert process.finish()
-    process.close()
+    process.draw(arch_response(), tmp_path / "film.avi", None, {})
+    # It answers.
+    with pytest.raises(ValueError, match=r"film\.avi"):
+        process.wait(lambda *_: None)
     assert "KeyboardInterrupt" not in capfd.readouterr().err
 
 

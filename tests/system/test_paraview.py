@@ -139,8 +139,27 @@ def test_apply_and_the_first_warp_show_what_their_names_say(shape, tmp_path):
 
 @pytest.mark.paraview
 @pytest.mark.skipif(PVPYTHON is None or XVFB is None, reason="pvpython or xvfb-run is not installed")
-def test_paraview_script_runs(folder, tmp_path):
-    command = [XVFB, "-a", "-s", "-screen 0 800x600x24", PVPYTHON, folder / "paraview_colours.py"]
+def test_paraview_script_runs(folder):
+    run_with_display(folder / "paraview_colours.py")
+
+
+@pytest.mark.paraview
+@pytest.mark.skipif(PVPYTHON is None or XVFB is None, reason="pvpython or xvfb-run is not installed")
+def test_paraview_script_shows_the_ties_that_are_there(tmp_path):
+    case = '[geometry]\nlayout = "arch on piers"\n[[settlement]]\ndirection = [1, 0]\nlimit = 0.01\n'
+    case += "[[settlement]]\ndirection = [1, 0]\nlimit = 0.01\n[[remove]]\nphase = 2\nties = ['low']\n"
+    for name, height in (("high", 1.95), ("low", 1.45)):
+        case += f'[[ties]]\nname = "{name}"\nfrom = [-1.3, {height}]\nto = [1.3, {height}]\nstiffness = 1e7\n'
+    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
+    script = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", film=False).folder / "paraview_colours.py"
+    told = '\nprint("TIES", FindSource("ties that are there and whole").GetDataInformation().GetNumberOfCells())\n'
+    script.write_text(script.read_text(encoding="utf-8") + told, encoding="utf-8")
+    assert "TIES 1" in run_with_display(script)
+
+
+def run_with_display(script):
+    """Give what a script of ParaView prints."""
+    command = [XVFB, "-a", "-s", "-screen 0 800x600x24", PVPYTHON, script]
     environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
     for _ in range(3):
         done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment)
@@ -150,3 +169,4 @@ def test_paraview_script_runs(folder, tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     assert "ERR|" not in done.stderr, done.stderr[-2000:]
     assert "Traceback" not in done.stderr, done.stderr[-2000:]
+    return done.stdout

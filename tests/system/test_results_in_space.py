@@ -206,6 +206,13 @@ def test_edges_between_faces_in_one_plane_are_not_drawn():
     assert not across.any()
 
 
+@pytest.mark.parametrize(("sides", "edges"), [(24, 48), (20, 60)])
+def test_chords_of_a_curved_face_are_not_drawn(sides, edges):
+    around = 2.0 * np.pi * np.arange(sides) / sides
+    drum = solver.Assembly.from_solids([upright(np.stack([np.cos(around), np.sin(around)], axis=1), 0.0, 1.0)])
+    assert len(sharp_edges(drum.polyhedra)) == edges
+
+
 @pytest.mark.slow
 def test_the_view_shows_the_motion_across_it():
     response = vault_response()

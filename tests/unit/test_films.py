@@ -31,7 +31,7 @@ from blockvis import animate
 from blockvis.pictures import video
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of, state_at
-from blockvis.pictures.live_load import LiveLoads
+from blockvis.pictures.live_load import LoadArrows
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.video import write_film
 from blockvis.results.folder import VIDEO_SUFFIXES
@@ -159,7 +159,7 @@ def test_what_a_limit_load_is_without_bears_no_load():
     live[2, 0] = 1000.0
     limit = solver.Structure(assembly, friction_coefficient=0.6).with_live(live).limit_load(fallen=np.arange(4) == 3)
     state = limit.response.path[0]
-    tails, tips = LiveLoads(limit.response, [state], 3.0).arrows(state, state.pose)
+    tails, tips = LoadArrows(limit.response, [state], 3.0).arrows(state, state.pose)
     assert len(tips) == 1
     assert tips[0, 1] == tails[0, 1]
     # Where hardly any load is left what is out of balance is none, here a thousandth of it on each block.
@@ -167,10 +167,10 @@ def test_what_a_limit_load_is_without_bears_no_load():
     forces = state.state.forces.copy()
     forces[1, 1] += amount
     rough = replace(state, parameter=1.0, held=replace(state.state, forces=forces))
-    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 2
+    assert len(LoadArrows(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 2
     residual = 2.0 * amount / mechanics.total_weight(assembly)
     rough = replace(rough, certificate=replace(state.certificate, equilibrium_residual=residual))
-    assert len(LiveLoads(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 1
+    assert len(LoadArrows(limit.response, [rough], 3.0).arrows(rough, rough.pose)[1]) == 1
 
 
 def test_pressure_is_drawn_on_the_face_that_it_meets():
@@ -181,14 +181,16 @@ def test_pressure_is_drawn_on_the_face_that_it_meets():
     pressure = weight.with_forces(assembly, solver.surface_forces(assembly, 1000.0, (1.0, 0.0)), "live")
     for loads, x in ((pressure, 0.0), (weight.with_acceleration(assembly, (1.0, 0.0)), 0.5)):
         limit = solver.Structure(assembly, friction_coefficient=0.6, loads=loads).limit_load()
-        (tip,) = LiveLoads(limit.response, limit.response.path, 3.0).arrows(limit.response.path[0], limit.state.pose)[1]
+        (tip,) = LoadArrows(limit.response, limit.response.path, 3.0).arrows(limit.response.path[0], limit.state.pose)[
+            1
+        ]
         np.testing.assert_allclose(tip, [x, 0.5], atol=1e-9)
 
 
 @pytest.mark.slow
 def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     response = sideways_block()
-    loads = LiveLoads(response, response.path, 1.0)
+    loads = LoadArrows(response, response.path, 1.0)
     before, after = response.path[:2]
     state = state_at(response.path, response.parameters, (before.parameter + after.parameter) / 2.0)
     lengths = [
@@ -216,7 +218,7 @@ def test_forces_of_ties_are_no_live_load(kind, dimension):
     structure = solver.Structure(assembly, friction_coefficient=1.0, ties=[tie])
     limit = structure.limit_load(acceleration=np.eye(dimension)[0])
     assert np.abs(limit.state.ties.forces) == pytest.approx([500.0])
-    loads = LiveLoads(limit.response, limit.response.path, 3.0)
+    loads = LoadArrows(limit.response, limit.response.path, 3.0)
     assert loads.largest == pytest.approx(limit.multiplier * mechanics.total_weight(assembly))
     (tip,) = loads.arrows(limit.response.path[0], limit.state.pose)[1]
     assert tip[-1] == pytest.approx(1.0)
@@ -246,7 +248,7 @@ def test_each_of_few_loads_has_an_arrow_of_its_own(dimension):
     forces = np.where(np.arange(27) == 20, 900.0, 300.0)
     forces[3] = 1.0
     limit = row_of(27, dimension, forces)
-    loads = LiveLoads(limit.response, limit.response.path, 27.0)
+    loads = LoadArrows(limit.response, limit.response.path, 27.0)
     tails, tips = loads.arrows(limit.response.path[0], limit.state.pose)
     lengths = (tips - tails)[:, 0]
     np.testing.assert_allclose(lengths / lengths.max(), np.maximum(forces / 900.0, 0.125), rtol=1e-4)
@@ -273,7 +275,7 @@ def test_a_section_shows_the_loads_of_blocks_that_it_leaves(monkeypatch, tmp_pat
 def test_the_legend_tells_where_not_each_load_has_an_arrow(dimension):
     forces = np.where(np.arange(120) == 77, 150.0, 100.0)
     limit = row_of(120, dimension, forces)
-    loads = LiveLoads(limit.response, limit.response.path, 120.0)
+    loads = LoadArrows(limit.response, limit.response.path, 120.0)
     tails, tips = loads.arrows(limit.response.path[0], limit.state.pose)
     if dimension == 2:
         assert "resultants of neighbours, longest arrow" in loads.words
@@ -510,7 +512,7 @@ kind = "limit load"
 kind = "live"
 """
     response = blockvis.run_case(case_from(text + load), tmp_path / "out", outputs=()).response
-    loads = LiveLoads(response, response.path, 4.0)
+    loads = LoadArrows(response, response.path, 4.0)
     for one, x in zip(response.path, places, strict=True):
         (tail,), (tip,) = loads.arrows(one, one.pose)
         along = (tip - tail) / np.linalg.norm(tip - tail)

@@ -188,6 +188,21 @@ def test_supports_that_settle_under_a_live_load_have_arrows_whatever_the_colours
     assert one == other > 20
 
 
+@pytest.mark.parametrize("acts", ["force = [0, -1000]", "weight_fraction = [0, -0.1]", ""])
+def test_dead_loads_beside_the_weight_have_arrows_where_they_act(tmp_path, acts):
+    case = '[geometry]\nlayout = "portal"\n[settlement]\ndirection = [0, -1]\nlimit = 0.01\n'
+    case += f'[[loads]]\nblocks = "lintel"\n{acts}\n' if acts else ""
+    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
+    response = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=()).response
+    picture = pixels(draw_still(response, -1, tmp_path / "still.png", size=(1280, 720), forces="none"))
+    arrow = np.argwhere(alike(picture, palette.LOADS["dead"], 30)[:576])
+    assert (len(arrow) > 20) == bool(acts)
+    if acts:
+        # Upright over the middle of the lintel, which is that of the picture.
+        assert np.ptp(arrow[:, 0]) > 3 * np.ptp(arrow[:, 1])
+        assert arrow[:, 1].mean() == pytest.approx(640.0, abs=3.0)
+
+
 def test_bent_blocks_are_filled_without_triangle_lines():
     assembly = solver.Assembly.from_outlines(list(BENT.values()))
     frame = Frame(np.array([-1.0, -1.0]), np.array([15.0, 4.0]))
@@ -292,6 +307,16 @@ def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, words):
     report = report_of(response).replace(" ", "")
     assert '"roles":[1,0]' in report
     assert '"live_words":""' not in report
+
+
+def test_what_does_not_stand_before_its_limit_load_is_told_as_that(tmp_path, words):
+    solids = [box((-1, -1, -0.4), (1, 1, 0)), box((0.9, -0.2, 0), (1.3, 0.2, 1))]
+    leaning = solver.Assembly.from_solids(solids, roles=["fixed", "free"])
+    push = solver.Loads(solver.self_weight(leaning).dead, solver.weight_fraction(leaning, (0.0, 1.0, 0.0)))
+    response = solver.limit_load(leaning, loads=push, friction_coefficient=0.9).response
+    draw_mechanism(response, tmp_path / "a.png", size=SMALL)
+    assert "no equilibrium under the dead load" in str(words[0])
+    assert [key.text for key in words[0]["keys"]][-1] == "as drawn"
 
 
 def test_mechanism_shows_parts_and_motion(tmp_path):

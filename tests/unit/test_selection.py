@@ -1,6 +1,7 @@
 """What of a drawing is a block: what is left out by itself or on request, and how it is told."""
 
 import json
+import re
 
 import ezdxf
 import numpy as np
@@ -178,6 +179,10 @@ def test_ignore_and_only(tmp_path):
     assert "ignore: 'stel' matches no layer, group or name; the drawing has 'steel'" in " ".join(
         read_layout(path, ignore="stel").notes
     )
+    said = "'brick, steel*' is one pattern, and matches nothing; give each of its parts by itself"
+    assert f"ignore: {said}" in read_layout(path, ignore="brick, steel*").notes
+    with pytest.raises(ValueError, match=re.escape(f"only: {said}")):
+        read_layout(path, only="brick, steel*")
 
 
 def test_what_only_names_is_not_left_out_by_itself(tmp_path):
