@@ -37,12 +37,17 @@ def determinant(a: np.ndarray) -> np.ndarray:
 
 def longest_step(a: np.ndarray, change: np.ndarray) -> float:
     """Largest part of a change that stays inside the cones, infinite where none leaves them."""
-    # What maps a to (1, 0) maps the cone to itself.
-    size = np.sqrt(determinant(a))
-    point, change = a / size, change / size
-    first = point[0] * change[0] - inner(point[1:], change[1:])
-    rest = change[1:] - (first + change[0]) / (1.0 + point[0]) * point[1:]
-    steepest = float((np.sqrt(inner(rest, rest)) - first).max(initial=0.0))
+    if len(a) == 2:
+        steepest = 0.0
+        for side in (1.0, -1.0):
+            steepest = float((-(change[0] + side * change[1]) / (a[0] + side * a[1])).max(initial=steepest))
+    else:
+        # What maps a to (1, 0) maps the cone to itself.
+        size = np.sqrt(determinant(a))
+        point, change = a / size, change / size
+        first = point[0] * change[0] - inner(point[1:], change[1:])
+        rest = change[1:] - (first + change[0]) / (1.0 + point[0]) * point[1:]
+        steepest = float((np.sqrt(inner(rest, rest)) - first).max(initial=0.0))
     return 1.0 / steepest if steepest > 0.0 else np.inf
 
 

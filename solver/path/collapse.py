@@ -84,12 +84,14 @@ class Fall:
 
     def relax(self, place: Place, farthest: float = FARTHEST_FALL) -> tuple[Place, bool]:
         """Where blocks move with the supports fixed, and whether they come to rest in equilibrium there."""
-        end, at_rest = place, False
+        end, at_rest, slow = place, False, 0
         for end, _, acceleration, speed in self.time_steps(place):
             if self.movements(place, end).max() > farthest:
                 return end, False
             at_rest = acceleration < SLOW and speed < SLOW
-            if at_rest and self.checks.in_equilibrium(end):
+            slow += at_rest
+            # Asked at the first of them, the second, the fourth: of places that creep most are in none.
+            if at_rest and slow & (slow - 1) == 0 and self.checks.in_equilibrium(end):
                 return end, True
         # A corner that comes to rest on the end of an edge is within rounding of contact points there.
         return end, at_rest and self.checks.in_equilibrium(end, CLOSING_GAP)

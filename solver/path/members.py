@@ -108,6 +108,8 @@ class Members:
         """Part of a step, from place to place, in which a member first comes to its strength; 1 where none does."""
         assert new.contacts is not None
         full = self._at_strength(new.contacts, new.trial)
+        if not len(full):
+            return 1.0
         started = self.measured(new.contacts[full], place.pose, place.tie_lengths)
         number, after = started.features[:, 1], new.trial[full, 0]
         before, strength = -started.gaps / self.model.length / self.compliance[number], self.strength[number]

@@ -303,7 +303,7 @@ class Stepper:
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
-        where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT
+        where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT_SLIDING
         closed = (where_sliding, EXACT if exact else np.inf)
         solved = self._solved(place, points, s, size, loads, resisting, before, closed)
         new, points, left, movement, is_linearised = solved
