@@ -294,7 +294,13 @@ def posed(assembly: solver.Assembly, pose: solver.Pose, force=None) -> solver.Re
     still = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
     points = {"friction": np.full(len(contacts), 0.6), "displacements": np.zeros_like(contacts.points)}
     held = replace(first.state, pose=pose, contacts=contacts, forces=forces, velocity=still, **points)
-    return replace(arch_response(), assembly=assembly, increments=(replace(first, held=held),), collapse=None)
+    return replace(
+        arch_response(),
+        assembly=assembly,
+        loads=solver.self_weight(assembly),
+        increments=(replace(first, held=held),),
+        collapse=None,
+    )
 
 
 @cache
