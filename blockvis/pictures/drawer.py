@@ -21,6 +21,7 @@ from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
 from . import palette
+from .acting_loads import LoadArrows
 from .backfill import fill_bodies
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text, matters
 from .flat_scene import FlatScene
@@ -38,7 +39,6 @@ from .frame import (
     sheet_size,
     write_labels,
 )
-from .live_load import LoadArrows
 from .marks import (
     ARROW,
     SMALLEST_RESULTANT,

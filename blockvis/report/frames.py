@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.pictures.acting_loads import LoadArrows
 from blockvis.pictures.frame import Frame, framed
-from blockvis.pictures.live_load import LoadArrows
 from blockvis.pictures.marks import (
     SMALLEST_RESULTANT,
     hinge_ends,

@@ -29,9 +29,9 @@ import blockvis
 import solver
 from blockvis import animate
 from blockvis.pictures import video
+from blockvis.pictures.acting_loads import LoadArrows
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of, state_at
-from blockvis.pictures.live_load import LoadArrows
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.video import write_film
 from blockvis.results.folder import VIDEO_SUFFIXES

@@ -25,7 +25,7 @@ MOST_ARROWS = 100
 
 
 @dataclass(frozen=True)
-class LiveLoad:
+class ActingLoad:
     """Dead loads, or live ones times their multiplier, in its sign: forces (n, d) [N] at points (n, d) [m].
 
     Each acts on one of the blocks (n,), or on several, of which it is the resultant and one is given. In space they may
@@ -48,7 +48,7 @@ class LiveLoad:
         return float(np.linalg.norm(self.forces, axis=1).max(initial=0.0))
 
 
-def live_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> LiveLoad:
+def live_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> ActingLoad:
     """Live load of an increment; none in a settlement, in a fall, or where it is unbounded.
 
     It is found as what contacts and ties balance beyond the dead load: the increment does not store the position of a
@@ -59,7 +59,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     assembly, pose = response.assembly, increment.pose
     if not (standing and finite):
         nowhere = np.zeros((0, assembly.dimension))
-        return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), pose)
+        return ActingLoad(nowhere, nowhere, np.zeros(0, dtype=int), pose)
     dead = response.dead_at(increment)
     live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + dead + _of_ties(response, increment))
     # What is out of balance would be a load, too, where a pushover ends with hardly any.
@@ -68,7 +68,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     return _acting(response, increment, live, (given.live, given.live_arms), 2.0 * unbalanced, extent)
 
 
-def dead_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> LiveLoad:
+def dead_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> ActingLoad:
     """Dead load of an increment beside weight and fill; ``extent`` [m] is that of the picture."""
     weight, given = solver.self_weight(response.assembly).dead, replace(response.loads_at(increment), fills=())
     dead = given.dead_at(response.assembly, increment.pose) - weight
@@ -84,7 +84,7 @@ def _acting(
     given: tuple[np.ndarray, np.ndarray | None],
     least: float,
     extent: float,
-) -> LiveLoad:
+) -> ActingLoad:
     """Find where loads (n_blocks, n_dof) [N, N·m] above the least [N] act; given are they as drawn, and their arms."""
     assembly, pose = response.assembly, increment.pose
     loads[~assembly.free | increment.fallen] = 0.0
@@ -103,7 +103,7 @@ def _acting(
         inside = [bool(drawn[b, :2].any()) and not turning[b].any() for b in blocks.tolist()]
         entries = zip(blocks.tolist(), inside, strict=True)
         points = np.reshape([_entry(assembly, pose, b, loads[b], inside=within) for b, within in entries], (-1, 2))
-    load = LiveLoad(points, forces[blocks], blocks, pose, len(acting))
+    load = ActingLoad(points, forces[blocks], blocks, pose, len(acting))
     return load if len(blocks) <= MOST_ARROWS else _gathered(load, 0.12 * extent)
 
 
@@ -147,7 +147,7 @@ class LoadArrows:
     ) -> None:
         self._dead, self._dimension = dead, response.assembly.dimension
         self._swinging = bool(response.limits) and response.collapse is None
-        self._loads: dict[tuple[int, float], LiveLoad] = {}
+        self._loads: dict[tuple[int, float], ActingLoad] = {}
         self._multipliers: dict[tuple[int, float], float] = {}
         if dead or response.measured == mechanics.LOAD_MULTIPLIER:
             # Frames of a swinging mechanism have the load of their limit state.
@@ -197,13 +197,13 @@ class LoadArrows:
         tips = load.carried(pose)
         return tips - grown * self._drawn(load), tips
 
-    def _drawn(self, load: LiveLoad) -> np.ndarray:
+    def _drawn(self, load: ActingLoad) -> np.ndarray:
         """(n, d) array [m]: arrows to scale, but for those that would be too short."""
         sizes, largest = np.linalg.norm(load.forces, axis=1), load.largest or 1.0
         longer = np.maximum(sizes, 0.125 * largest) / np.maximum(sizes, ROUNDING * largest)
         return np.asarray(self._scale * longer[:, None] * load.forces)
 
-    def _load_at(self, increment: solver.Increment) -> tuple[LiveLoad, float]:
+    def _load_at(self, increment: solver.Increment) -> tuple[ActingLoad, float]:
         """Find the load of an increment and by what it has grown: between two of a path it is the one before's."""
         if _place(increment) in self._loads:
             return self._loads[_place(increment)], 1.0
@@ -212,7 +212,7 @@ class LoadArrows:
         return self._loads[before], increment.load_multiplier / multiplier if multiplier else 1.0
 
 
-def _in_section(load: LiveLoad, assembly: solver.Assembly, plane: np.ndarray | None) -> LiveLoad:
+def _in_section(load: ActingLoad, assembly: solver.Assembly, plane: np.ndarray | None) -> ActingLoad:
     """Leave out the loads of blocks that a section leaves out; those on cut-off parts of others act on its plane."""
     kept = kept_blocks(plane, assembly, load.pose)[load.blocks]
     points = load.points[kept]
@@ -240,7 +240,7 @@ def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.nd
     return np.asarray(through + ((crossed - through) @ unit).min() * unit) if len(crossed) else centre
 
 
-def _gathered(load: LiveLoad, cell: float) -> LiveLoad:
+def _gathered(load: ActingLoad, cell: float) -> ActingLoad:
     """Resultants of the loads in each cell of a grid, at the load nearest to where their weights meet.
 
     Where they meet itself may lie in an opening.
