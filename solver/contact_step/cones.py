@@ -38,9 +38,8 @@ def determinant(a: np.ndarray) -> np.ndarray:
 def longest_step(a: np.ndarray, change: np.ndarray) -> float:
     """Largest part of a change that stays inside the cones, infinite where none leaves them."""
     if len(a) == 2:
-        steepest = 0.0
-        for side in (1.0, -1.0):
-            steepest = float((-(change[0] + side * change[1]) / (a[0] + side * a[1])).max(initial=steepest))
+        sides, moving = (np.concatenate([of[0] + of[1], of[0] - of[1]]) for of in (a, change))
+        steepest = float((-moving / sides).max(initial=0.0))
     else:
         # What maps a to (1, 0) maps the cone to itself.
         size = np.sqrt(determinant(a))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -28,8 +29,11 @@ class NotSolved(Exception):
     moved = 0.0
 
 
-def factorisation(pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, dof: int) -> Band | Fronts:
-    """Choose how to factorise what acts between pairs of blocks, (n, 2) int array with -1 for a support."""
+@lru_cache(maxsize=4)
+def factorisation(between: bytes, at: bytes | None, n_blocks: int, dof: int) -> Band | Fronts:
+    """Choose how to factorise what acts between pairs of blocks, (n, 2) int array with -1 for a support, at places."""
+    pairs = np.frombuffer(between, dtype=np.int64).reshape(-1, 2)
+    places = None if at is None else np.frombuffer(at).reshape(n_blocks, -1)
     touching = pairs[(pairs >= 0).all(axis=1)]
     graph = sp.csr_array((np.ones(len(touching)), touching.T), shape=(n_blocks, n_blocks))
     joined = sp.csr_array(graph + graph.T + sp.eye_array(n_blocks))

@@ -74,7 +74,7 @@ class _Iterate:
         # The start lies well inside limits and cones; rounding of forces before says nothing of a point that is open.
         normal = np.maximum(p.forces[:, 0], mean / np.maximum(p.gap, mean / 0.3))
         self.normal = np.minimum(normal, 0.5 * p.most)
-        self.yielding = mean / self.reserve
+        self.yielding = mean / (self.limit - self.sense * self.normal[self.limited])
         self.yielding[len(upper) :] = np.maximum(self.yielding[len(upper) :], p.gap[lower])
         limit, slip = self.friction * self.normal[self.rough] + self.bound, p.slip[self.rough].T
         shear = p.forces[self.rough, 1:].T
@@ -83,11 +83,6 @@ class _Iterate:
         self.motion, self.multiplier = np.zeros_like(p.load), multiplier
         self.distance = np.column_stack([p.gap, p.slip]) - p.compliance * p.forces
         self.measure()
-
-    @property
-    def reserve(self) -> np.ndarray:
-        """(l,) array: what is missing from limited normal forces to their limit."""
-        return np.asarray(self.limit - self.sense * self.normal[self.limited])
 
     def of_points(self, limits: np.ndarray) -> np.ndarray:
         """(n,) array: sums of numbers of the limits over each point, which may have both."""
@@ -107,6 +102,8 @@ class _Iterate:
     def measure(self) -> None:
         """Compute the residuals of the equations and the mean product."""
         p, rough = self.problem, self.rough
+        # What is missing from limited normal forces to their limit.
+        self.reserve = self.limit - self.sense * self.normal[self.limited]
         self.u = self.in_cones(self.normal, self.shear, self.bound)
         self.all_forces = self.forces(self.normal, self.shear)
         self.unbalanced = p.unbalanced(self.motion, self.all_forces, self.multiplier)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import scipy.sparse as sp
 
-from solver.contact_step.factors import Band, Fronts, Solve, factorisation
+from solver.contact_step.factors import Solve, factorisation
 
 
 @lru_cache(maxsize=4)
@@ -21,12 +21,6 @@ def _over_pairs(pairs: bytes) -> tuple[sp.csr_array, bytes]:
     _, first, pair = np.unique(keys, return_index=True, return_inverse=True)
     sums = sp.csr_array((np.ones(len(points)), (pair, points)), shape=(len(first), len(points)))
     return sums, of_points[first].tobytes()
-
-
-@lru_cache(maxsize=4)
-def _factorisation(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) -> Band | Fronts:
-    of_blocks = None if places is None else np.frombuffer(places).reshape(n_blocks, -1)
-    return factorisation(np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2), of_blocks, n_blocks, dof)
 
 
 class ContactRows:
@@ -87,5 +81,5 @@ class ContactRows:
         for c, at in enumerate(np.cumsum(np.arange(both, 0, -1)) - np.arange(both, 0, -1)):
             np.einsum("in,irn->rn", rows[:, c], weighted[:, c:], out=each[at : at + both - c])
         sums, pairs = _over_pairs(self.key)
-        of_pairs = _factorisation(pairs, self.places, self.n_dof // self.dof, self.dof)
+        of_pairs = factorisation(pairs, self.places, self.n_dof // self.dof, self.dof)
         return of_pairs.factorised(sums @ each.T, diagonal)

@@ -69,11 +69,11 @@ class Fall:
                 continue
             place = new
             yield place, motion, error.turn / time**2, moved / time
-            # Each is twice as long as the one before, so that forces out of balance would have moved the blocks, unless
-            # friction that has yet to follow the normal forces holds them; steps that grow faster carry blocks past
-            # places where they come to rest.
-            idle = idle + 1 if moved < NO_MOVEMENT and self.checks.is_within_friction(new) else 0
-            if idle == 12:
+            # Each is twice as long as the one before, so that forces out of balance would have moved the blocks, once
+            # friction has followed the normal forces; steps that grow faster carry blocks past places where they come
+            # to rest.
+            idle = idle + 1 if moved < NO_MOVEMENT else 0
+            if idle == 15:
                 return
             time = min(time * (2.0 if moved < largest / 3.0 else 1.0), longest)
 

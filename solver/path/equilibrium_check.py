@@ -50,14 +50,6 @@ class EquilibriumChecks:
             return True
         return most > max(part * place.multiplier / program.unit - CARRIES, 0.0)
 
-    def is_within_friction(self, place: Place) -> bool:
-        """Whether the forces of a place are within friction and cohesion, as they are where blocks only turn."""
-        contacts, normal = place.contacts, place.forces[:, 0]
-        assert contacts is not None
-        _, least, cohesion = self.stepper.joint_limits(place, contacts)
-        allowed = self.stepper.friction(contacts) * (normal - least) + cohesion
-        return bool((np.linalg.norm(place.forces[:, 1:], axis=1) < allowed + CARRIES).all())
-
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
         """(n_contacts, d) array: forces in equilibrium nearest to those of a place, in units of the program.
 

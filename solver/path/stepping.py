@@ -13,6 +13,7 @@ many joints slide; this has one, and the limit of short steps exists.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -147,7 +148,8 @@ class Stepper:
         self.programs = 0
         # Contact points with a larger gap are not looked at.
         reach = model.length / 4.0
-        self._found = lru_cache(2)(
+        # Of blocks at the last two poses: a step goes on from one or is taken anew.
+        self.contacts: Callable[[Pose], Contacts] = lru_cache(2)(
             lambda pose: model.standing(find_contacts(assembly, moved_vertices(assembly, pose), reach))
         )
         support_motion = driver.rate(0.0)[assembly.moving, :d]
@@ -184,10 +186,6 @@ class Stepper:
             return self.model.assembly.shapes.measure(vertices, contacts)
         of_blocks = self.model.assembly.shapes.measure(vertices, contacts[~members])
         return joined_contacts([of_blocks, self.members.measured(contacts[members], pose, tie_lengths)])
-
-    def contacts(self, pose: Pose) -> Contacts:
-        """Return the contact points of blocks at a pose; those of the last two are kept: a step goes on or anew."""
-        return self._found(pose)
 
     def friction(self, contacts: Contacts) -> np.ndarray:
         """(n,) array: friction coefficients."""
