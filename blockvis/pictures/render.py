@@ -225,7 +225,8 @@ def _mechanism_note(response: solver.Response, n: int) -> str:
             acts = f"mechanism at the limit load   ·   {friction}   ·   {bodies}"
             return acts if n else f"no mechanism   ·   {friction}"
         gone = loss_words(response.path[-1]) if response.path else []
-        return "   ·   ".join([f"{response.stop}: the motion that would follow", bodies, *gone])
+        follows = "in which blocks wedge" if response.stop == solver.Status.LOCKED else "that would follow"
+        return "   ·   ".join([f"{response.stop}: the motion {follows}", bodies, *gone])
     loss = loss_of(response)
     what = "collapse mechanism" if loss is None or not loss.local else "local loss"
     falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of the weight fall"
