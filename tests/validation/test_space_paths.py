@@ -118,8 +118,8 @@ def test_factors_by_fronts_and_of_a_band_give_the_same(monkeypatch):
     spreads = solver.Settlement(direction=(1, 0, 0), increment=0.01, limit=0.01)
     narrow = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
     # The wrapped function keeps none.
-    unkept = import_module("solver.contact_step.stiffness")._factorisation.__wrapped__
-    monkeypatch.setattr("solver.contact_step.stiffness._factorisation", unkept)
+    unkept = import_module("solver.contact_step.stiffness").factorisation.__wrapped__
+    monkeypatch.setattr("solver.contact_step.stiffness.factorisation", unkept)
     monkeypatch.setattr("solver.contact_step.factors.WIDE", 0)
     monkeypatch.setattr("solver.ordering.WHOLE", 3)
     by_fronts = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
