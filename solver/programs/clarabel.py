@@ -6,15 +6,13 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
+from solver.tolerances import FEASIBILITY_TOLERANCE, INTERIOR_TOLERANCE
+
 from .problem import ConicProgram, Solution
 
 #: Tolerance of Clarabel, and what it adds to the diagonal of its equations before factors, which refinement takes back:
 #: with its default of 1e-8 a quarter of the programs of a vault whose stones slide ended at gaps of 1e-6.
 TOLERANCE, REGULARISATION = 1e-11, 1e-7
-
-#: Errors of balance and of the motion at which a program ends, too, once its gap is within the tolerance: where
-#: equilibrium determines a reaction no motion is inside the cones, and its error stays at 1e-9 for up to 60 iterations.
-BALANCE, MOTION = 1e-10, 1e-8
 
 #: Whether rows and columns are scaled anew, by route: of weightless blocks none seemed to balance small loads so.
 ROUTES = {"clarabel": True, "clarabel not equilibrated": False}
@@ -43,8 +41,13 @@ def run_clarabel(program: ConicProgram, route: str) -> tuple[Solution | None, st
     rows_of_dual = sp.csc_matrix((program.matrix @ sp.diags_array(scale)).T)
     zero = sp.csc_matrix((rows, rows))
     solver = clarabel.DefaultSolver(zero, -program.right, rows_of_dual, scale * program.cost, cones, settings)
+    # Where equilibrium determines a reaction no motion is inside the cones, and its error stays for 60 iterations.
     solver.set_termination_callback(
-        lambda at: at.res_dual <= BALANCE and at.res_primal <= MOTION and min(at.gap_abs, at.gap_rel) <= TOLERANCE
+        lambda at: (
+            at.res_dual <= FEASIBILITY_TOLERANCE
+            and at.res_primal <= INTERIOR_TOLERANCE
+            and min(at.gap_abs, at.gap_rel) <= TOLERANCE
+        )
     )
     solution = solver.solve()
     x, y = scale * np.asarray(solution.z), np.asarray(solution.x)
