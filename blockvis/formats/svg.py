@@ -136,7 +136,8 @@ class _Context:
     def within(self, element: ElementTree.Element, matrix: np.ndarray) -> _Context:
         """Context of what an element holds, painted as that says or else as what is around it."""
         painting = {key: _style(element, key) or value for key, value in self.painting.items()}
-        return replace(self, matrix=matrix, depth=self.depth + 1, painting=painting)
+        sheet = _sheet(element, self) if _tag(element) == "svg" else self.sheet
+        return replace(self, matrix=matrix, depth=self.depth + 1, painting=painting, sheet=sheet)
 
     @property
     def layer(self) -> str:
@@ -316,9 +317,7 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
             found.notes.append(Note(LEFT_OUT, f"an inner {_called(element)} was skipped: it {error}"))
             return
     where = where.within(element, matrix)
-    if tag == "svg":
-        where = replace(where, sheet=_sheet(element, where))
-    elif tag == "g":
+    if tag == "g":
         where = _in_group(element, where)
     found.clipped.update(f"<{tag}> with a {key}" for key in ("clip-path", "mask") if "url(" in _style(element, key))
     if tag in _SHAPES:
