@@ -572,6 +572,14 @@ def test_stones_that_run_into_a_rim_are_stones(tmp_path, capsys, rim):
         np.testing.assert_allclose(one - [0.01 * left, 0.01 * low], other, atol=1e-9)
 
 
+@pytest.mark.parametrize("reader", [read, read_layout])
+def test_an_option_that_is_misspelled_is_refused(tmp_path, reader):
+    """Of an image it was passed over without a word."""
+    drawn_wall()[0].save(tmp_path / "wall.png")
+    with pytest.raises(TypeError, match=r"there is no option backgruond .*did you mean .*background"):
+        reader(tmp_path / "wall.png", width=3.0, backgruond="white")
+
+
 def test_a_pinhole_does_not_lose_its_stone(tmp_path):
     image, n = drawn_wall()
     ImageDraw.Draw(image).rectangle((40, 30, 43, 33), fill=0)
