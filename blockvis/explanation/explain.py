@@ -49,6 +49,9 @@ from .write import FILES, write_explanation
 #: Range of the coefficient of friction, as fractions of that of the case, where the case gives none.
 FRICTIONS = (0.8, 1.25)
 
+#: Rounds of runs: all candidates, others around the best of them, and the likeliest with other friction.
+ROUNDS = 3
+
 #: Most causes that are looked at more closely, of those worth a word.
 MOST_REFINED = 4
 
@@ -131,7 +134,7 @@ def explain(
             'leave a support out, add "rotation" to directions, or observe displaced points'
         )
     about = 3 * len(first)
-    with workers_for(about, workers, scheduler) as processes, RunsProgress(shown=progress) as bar:
+    with workers_for(about, workers, scheduler) as processes, RunsProgress(ROUNDS, shown=progress) as bar:
         search.carry_out(first, processes, bar)
     causes = search.ranked()
     opened, all_points = observations.widths > 0.0, np.ones(len(observations.points), dtype=bool)

@@ -347,9 +347,14 @@ def _of_noise(image: Image.Image) -> _Found:
     return _Found(numbers, tuple(range(len(colours))), colours, rgb, own)
 
 
+def rim_of(numbers: np.ndarray) -> np.ndarray:
+    """Give what is along the border of an image (height, width)."""
+    return np.concatenate([numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]])
+
+
 def _outer(numbers: np.ndarray) -> int:
     """Find the commonest number on the rim."""
-    rim = np.concatenate([numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]])
+    rim = rim_of(numbers)
     return int(np.bincount(rim[rim >= 0], minlength=1).argmax())
 
 

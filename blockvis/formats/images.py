@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from blockvis.layout.outlines import ring_area
 from blockvis.text import listed, numbered
 from solver.mechanics import counted
 
-from .image_labels import Labels, Photograph, labels_of
+from .image_labels import Labels, Photograph, labels_of, rim_of
 from .image_scale import Placement, opened, placement_of
 from .pixels import SPECK, SPECK_OF_NOISE, STAIRS, Outlined, Regions, outlined, regions_of
 from .reading import Reading
@@ -35,6 +36,9 @@ PINHOLES = 0.01
 #: A region of so many times the median area may be an opening, and of half as many in a drawing of lines, whose
 #: openings are all regions, a door of four to six ashlars; so many are named.
 MAYBE_OPENING, NAMED = 8.0, 3
+
+#: A rim that runs into more stones than this, and has joints along no more of its length, is none of paper.
+FEWEST_AT_RIM, MOST_JOINTS = 4, 0.25
 
 #: What makes masks of photographs.
 MASK_MAKERS = "by hand GIMP, labelme or CVAT, by a model SAM"
@@ -59,6 +63,7 @@ def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> 
     """Make a layout of the regions of labels."""
     smallest, tolerance = reading.image.get("smallest"), reading.image.get("outline_tolerance")
     noisy = not labels.is_mask and not labels.names
+    labels, rims = _without_rim(labels, placement.pixel) if labels.is_mask else (labels, [])
     speck = SPECK_OF_NOISE if noisy else SPECK
     regions = regions_of(labels.numbers, None if smallest is None else smallest / placement.pixel, speck)
     _check_stones(labels, regions, placement)
@@ -70,7 +75,7 @@ def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> 
     filled = [k for k in found.holes if k not in holes]
     names, groups = _named(labels, regions)
     rings = tuple(_turned(placement.placed(ring * [1.0, -1.0])) for ring in found.rings)
-    notes = _notes(labels, regions, found, placement)
+    notes = (*_notes(labels, regions, found, placement), *rims)
     if filled:
         size = regions.smallest * placement.pixel
         text = f"pinholes were filled, less than {100 * PINHOLES:g} % of their stone or {size:.3g} m across (smallest)"
@@ -88,6 +93,35 @@ def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> 
         message += "background"
         around[k] = LeftOut("hole", rings[k], message, holes=placed)
     return layout.leaving_out(around)
+
+
+def _without_rim(labels: Labels, pixel: float) -> tuple[Labels, list[str]]:
+    """Take a closed rim of a mask off that its outer stones run into, as of a canvas; and say so.
+
+    Paper around a drawing has long lines along it, and is large beside the stones.
+    """
+    from scipy import ndimage
+
+    rows, columns = (np.flatnonzero((labels.numbers == 0).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return labels, []
+    inside = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    pieces, n = ndimage.label(labels.numbers[inside])
+    rim, areas = rim_of(pieces), np.bincount(pieces.ravel(), minlength=n + 1)
+    outer = np.unique(rim[rim > 0])
+    large = outer[areas[outer] >= MAYBE_OPENING * np.median(areas[1:])] if n else outer
+    closed = (rim_of(labels.numbers) > 0).all()
+    if not closed or len(outer) <= FEWEST_AT_RIM or np.mean(rim == 0) > MOST_JOINTS or 2 * len(large) > len(outer):
+        return labels, []
+    numbers = np.zeros_like(labels.numbers)
+    numbers[inside] = labels.numbers[inside]
+    widths = [rows[0], columns[0], *np.subtract(labels.numbers.shape, 1) - [rows[-1], columns[-1]]]
+    text = (
+        f"a rim along the border of the image, {max(widths)} pixels = {max(widths) * pixel:.3g} m wide, was taken off: "
+    )
+    return replace(labels, numbers=numbers), [
+        Note(CHANGED, f"{text}it has the value of the stones, and made one of {len(outer)} of them")
+    ]
 
 
 def _check_stones(labels: Labels, regions: Regions, placement: Placement) -> None:
@@ -130,8 +164,7 @@ def _check_holes(labels: Labels, regions: Regions, holed: Collection[int]) -> No
 
 def _paper_at_rim(regions: Regions) -> list[int]:
     """Regions of a drawing of lines that the rim of the image closes, such as the sky and the opening of an arch."""
-    rows = regions.numbers
-    rim = np.unique(np.concatenate([rows[0], rows[-1], rows[:, 0], rows[:, -1]])) - 1
+    rim = np.unique(rim_of(regions.numbers)) - 1
     least = MAYBE_OPENING * float(np.median(regions.areas))
     return [k for k in rim.tolist() if k >= 0 and regions.areas[k] >= least]
 

@@ -28,6 +28,7 @@ from blockvis.layout.unfilled import walls_to_fill
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.system.atomic_files import atomic_file, write_atomic
+from blockvis.text import nearest
 from solver import mechanics
 
 from .bodies import Bodies, as_drawn, in_dimension, with_role
@@ -127,6 +128,10 @@ def _reading(
     dimension: int | str,
     image: ImageKeys,
 ) -> Reading:
+    strange = next((key for key in image if key not in ImageKeys.__annotations__), None)
+    if strange is not None:
+        known = [*(read.__kwdefaults__ or ()), *ImageKeys.__annotations__]
+        raise TypeError(f"there is no option {strange}{nearest(strange, known)}; blockvis.read lists them")
     if unit is not None:
         metres_per(unit)
     if chord_tolerance is not None and not 0.0 < chord_tolerance < np.inf:
@@ -308,30 +313,23 @@ def read(
     only: str | Sequence[str] = (),
     window: Sequence[float] | None = None,
     closing: str = "auto",
-    outline_tolerance: float | None = None,
     dimension: int | str = "auto",
-    width: float | None = None,
-    height: float | None = None,
-    pixel: float | None = None,
-    background: int | str | None = None,
-    smallest: float | None = None,
+    **image: Unpack[ImageKeys],
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
     Parameters
     ----------
     path : str or Path
-    roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing, outline_tolerance
-        As of :func:`blockvis.layout.assemble.assemble`.
-    unit, chord_tolerance, view, ignore, only, window, dimension
+    roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing
+        As of :func:`blockvis.layout.assemble.assemble`, as is ``outline_tolerance``.
+    unit, chord_tolerance, view, ignore, only, window, dimension, **image
         As of :func:`read_layout`.
-    width, height, pixel, background, smallest
-        Of an image; as of :class:`blockvis.formats.image_scale.ImageKeys`.
     """
     chosen: dict[str, Any] = {"chord_tolerance": chord_tolerance, "view": view, "only": only, "window": window}
-    chosen |= {"dimension": dimension, "thickness": thickness, "width": width, "height": height, "pixel": pixel}
-    chosen |= {"background": background, "smallest": smallest, "outline_tolerance": outline_tolerance}
+    chosen |= {"dimension": dimension, "thickness": thickness, **image}
     layout = read_layout(path, unit=unit, ignore=ignore, **chosen)
+    outline_tolerance = image.get("outline_tolerance")
     if chord_tolerance is not None and outline_tolerance is None:
         # Who says how fine arcs are wants their chords.
         outline_tolerance = 0.0
@@ -413,14 +411,7 @@ def inspect(
 
     Parameters
     ----------
-    path : str or Path
-    unit : str, optional
-        Unit of the file's lengths; it replaces the one that the file states.
-    view : {"xy", "xz", "yz"}, optional
-    ignore, only : str or sequence of str, optional
-    window : sequence of float, optional [m]
-    dimension : {"auto", 2, 3}
-    **image
+    path, unit, view, ignore, only, window, dimension, **image
         As of :func:`read_layout`.
     """
     chosen: dict[str, Any] = {"unit": unit, "view": view, "only": only, "window": window, "dimension": dimension}

@@ -103,6 +103,7 @@ class _Context:
     labels write the name of a layer so, and others give every group one. An id that is a role counts in any case.
     ``named`` says whether one has a label.
     Painting are values of the properties by which shapes are painted, which elements have from those around them.
+    ``sheet`` is what percentages are parts of: width and height of the innermost <svg>, in its units.
     """
 
     matrix: np.ndarray
@@ -111,6 +112,7 @@ class _Context:
     depth: int = 0
     named: bool = False
     painting: Mapping[str, str] = field(default_factory=_PAINTING.copy)
+    sheet: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def fills(self) -> bool:
@@ -134,7 +136,8 @@ class _Context:
     def within(self, element: ElementTree.Element, matrix: np.ndarray) -> _Context:
         """Context of what an element holds, painted as that says or else as what is around it."""
         painting = {key: _style(element, key) or value for key, value in self.painting.items()}
-        return replace(self, matrix=matrix, depth=self.depth + 1, painting=painting)
+        sheet = _sheet(element, self) if _tag(element) == "svg" else self.sheet
+        return replace(self, matrix=matrix, depth=self.depth + 1, painting=painting, sheet=sheet)
 
     @property
     def layer(self) -> str:
@@ -212,14 +215,23 @@ def _view_box(element: ElementTree.Element) -> list[float] | None:
     return numbers if len(numbers) == 4 else None
 
 
-def _viewport(element: ElementTree.Element) -> np.ndarray:
+def _sheet(element: ElementTree.Element, where: _Context) -> tuple[float, float]:
+    """Width and height of what an <svg> shows, in its units; not a number where it does not say."""
+    box = _view_box(element)
+    if box is not None:
+        return box[2], box[3]
+    width, height = (_in_user_units(element.get(side, ""), side, where.sheet) for side in ("width", "height"))
+    return width, height
+
+
+def _viewport(element: ElementTree.Element, where: _Context) -> np.ndarray:
     """(3, 3) array: where an inner <svg> shows what it holds, its viewBox in its rectangle; SVG 1.1, 7.8."""
-    corner, box = [_length(element, "x"), _length(element, "y")], _view_box(element)
+    corner, box = [_length(element, "x", where), _length(element, "y", where)], _view_box(element)
     matrix = np.eye(3)
     matrix[:2, 2] = corner
     if box is not None:
         start, span = np.array(box[:2]), np.array(box[2:])
-        size = np.array([_length(element, "width"), _length(element, "height")])
+        size = np.array([_length(element, "width", where), _length(element, "height", where)])
         if not (size > 0.0).all() or not (span > 0.0).all():
             raise ValueError("has no width, height or viewBox above 0; give them")
         scale, ratio = size / span, element.get("preserveAspectRatio", "xMidYMid")
@@ -296,11 +308,11 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
         return
     matrix, shown = where.matrix @ _matrix(_transform(element)), list(element)
     if tag == "use":
-        matrix[:2, 2] += matrix[:2, :2] @ [_length(element, "x"), _length(element, "y")]
+        matrix[:2, 2] += matrix[:2, :2] @ [_length(element, "x", where), _length(element, "y", where)]
         shown = _originals(element, found)
     if tag == "svg" and where.depth:
         try:
-            matrix = matrix @ _viewport(element)
+            matrix = matrix @ _viewport(element, where)
         except ValueError as error:
             found.notes.append(Note(LEFT_OUT, f"an inner {_called(element)} was skipped: it {error}"))
             return
@@ -466,21 +478,33 @@ _STEPS: dict[str, Callable[..., list[list[float]]]] = {
 }
 
 
-def _length(element: ElementTree.Element, key: str) -> float:
+def _length(element: ElementTree.Element, key: str, where: _Context) -> float:
     text = element.get(key, "0")
-    match = re.fullmatch(rf"\s*({_NUMBER})\s*([a-z%]*)\s*", text)
-    if not match or match[2] not in ("", "px"):
+    length = _in_user_units(text, key, where.sheet)
+    if math.isnan(length):
         raise ValueError(f"has {key}='{text}'; give a number in user units")
-    return float(match[1])
+    return length
+
+
+def _in_user_units(text: str, key: str, sheet: tuple[float, float]) -> float:
+    """Length of an attribute on a sheet of this width and height, in user units; not a number where it is none."""
+    # Of a radius percentages are parts of the diagonal over the root of two; SVG 1.1, 7.10.
+    sides = dict(zip(("x", "y", "width", "height"), 2 * sheet, strict=True))
+    whole = sides.get(key.strip("cr12"), math.hypot(*sheet) / math.sqrt(2.0))
+    units = {"": 1.0, "%": whole / 100.0} | {unit: size / UNITS["px"] for unit, size in UNITS.items()}
+    match = re.fullmatch(rf"\s*({_NUMBER})\s*([a-z%]*)\s*", text)
+    return float(match[1]) * units.get(match[2], math.nan) if match else math.nan
 
 
 def _rectangle(element: ElementTree.Element, where: _Context) -> list[_Part]:
-    x, y, w, h = (_length(element, key) for key in ("x", "y", "width", "height"))
+    x, y, w, h = (_length(element, key, where) for key in ("x", "y", "width", "height"))
     if not (w > 0 and h > 0):
         return []
     corners = rectangle(x, y, x + w, y + h)
     # A radius that is not given is the other one.
-    given = [_length(element, key) for key in ("rx", "ry") if element.get(key, "auto").strip() != "auto"] or [0.0]
+    given = [_length(element, key, where) for key in ("rx", "ry") if element.get(key, "auto").strip() != "auto"] or [
+        0.0
+    ]
     radii = np.minimum([given[0], given[-1]], [w / 2.0, h / 2.0])
     if not (radii > 0).all():
         return [_Part(corners, True)]
@@ -493,11 +517,11 @@ def _rectangle(element: ElementTree.Element, where: _Context) -> list[_Part]:
 
 
 def _ellipse(element: ElementTree.Element, where: _Context) -> list[_Part]:
-    centre = np.array([_length(element, "cx"), _length(element, "cy")])
+    centre = np.array([_length(element, "cx", where), _length(element, "cy", where)])
     if _tag(element) == "circle":
-        radii = np.full(2, _length(element, "r"))
+        radii = np.full(2, _length(element, "r", where))
     else:
-        radii = np.array([_length(element, "rx"), _length(element, "ry")])
+        radii = np.array([_length(element, "rx", where), _length(element, "ry", where)])
     if not (radii > 0).all():
         return []
     n = _chords(2 * math.pi, float(radii.max()), where)
@@ -519,7 +543,7 @@ def _polygon(element: ElementTree.Element, where: _Context) -> list[_Part]:
 
 
 def _segment(element: ElementTree.Element, where: _Context) -> list[_Part]:
-    ends = np.array([[_length(element, f"{axis}{end}") for axis in "xy"] for end in (1, 2)])
+    ends = np.array([[_length(element, f"{axis}{end}", where) for axis in "xy"] for end in (1, 2)])
     return [_Part(ends, False)]
 
 

@@ -16,6 +16,7 @@ from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.formats.reading import naming
 from blockvis.results.about import EXACT, mechanism_text
+from blockvis.results.mechanism_arrays import corner_speeds
 from blockvis.text import beginning, nearest
 from solver import mechanics
 
@@ -48,6 +49,10 @@ CONTROL = Section(
             "[settlement] holds over it", 0.002, default=solver.Controls.step_tolerance, elsewhere=True),
     ),
 )  # fmt: skip
+
+
+#: A block that moves so many times as fast as the control point is told: of one body on a hinge, the top does not.
+MOST_TIMES_AS_FAST = 10.0
 
 
 class PushoverKind(AnalysisKind):
@@ -198,6 +203,26 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
     return replace(control, block=assembly.names[block])
 
 
+def _left_behind(
+    assembly: solver.Assembly, control: solver.ControlDisplacement, increment: solver.Increment
+) -> list[str]:
+    """Say that what the live load moves hardly moves the control point, for which nothing can be told of its path."""
+    block, pose, d = [assembly.index(control.block)], increment.pose, assembly.dimension
+    point = np.atleast_2d(assembly.centroids[block] if control.point is None else control.point)
+    point = mechanics.carried(point, np.array(block), solver.Pose.initial(assembly), pose)
+    towards = np.eye(d)[0] if control.direction is None else np.asarray(control.direction)
+    own = float(mechanics.point_velocities(point, np.array(block), pose, increment.velocity)[0] @ towards)
+    speeds = corner_speeds(assembly, pose, increment.velocity)
+    fastest = int(speeds.argmax())
+    if speeds[fastest] <= MOST_TIMES_AS_FAST * abs(own):
+        return []
+    name, times = assembly.names[fastest], f"{speeds[fastest] / abs(own):.2g} times as fast as" if own else "and not"
+    return [
+        f"[control] block = '{control.block}' is not what the live load moves: '{name}' moves {times} its control "
+        f"point, whose displacement says little of the path; name '{name}' as the block"
+    ]
+
+
 def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechanics.PathState | None) -> Steps:
     case = given.case
     pose, ties_at, bonds_at = None, None, None
@@ -225,5 +250,6 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechani
         )
         for number, increment in enumerate(pushed):
             words = left_by(case.settlements) if number == 0 and resume is None else []
+            words += _left_behind(given.assembly, control, increment) if number == 0 else []
             yield replace(increment, notes=(*increment.notes, *words))
     return pushed.ending

@@ -17,7 +17,7 @@ from solver.mechanics import counted
 from .facing import Facing as FacedJoints
 from .facing import faced, facing_tolerance
 from .joints.close import Proposal, proposed
-from .joints.facing_edges import Facing, open_shares, rounded_up
+from .joints.facing_edges import WIDEST_JOINT, Facing, is_mortar, open_shares, rounded_up
 from .layout import Layout
 from .outlines import ROUNDING
 from .refusal import carrying
@@ -28,15 +28,6 @@ from .solids import size_of, width_of
 
 #: Classes of joint thickness in the report.
 CLASSES = 8
-
-#: Gaps between faces that cover each other are joints drawn open up to this part of the width of a typical block; those
-#: below what counts as one place in a drawing are rounding of coordinates.
-WIDEST_JOINT = 0.2
-
-#: Gaps are mortar where this share of the length of all joints is open, or where this share of the open length has
-#: as much on the other side of its block, more than beside a single row of stones; else they are openings, cracks or
-#: wedges, and stay as drawn.
-MORTAR_SHARE, OPPOSITE_SHARE = 0.15, 0.6
 
 #: Density of blocks for which the layout has none [kg/m³], as of a run.
 DENSITY = 2000.0
@@ -181,19 +172,19 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     proposal = proposed(simple, laid=np.array(layout.laid))
     smallest = DRAWN_GAP * width
     shares = open_shares(simple, proposal.stretches, smallest)
-    is_mortar = shares[0] >= MORTAR_SHARE or shares[1] >= OPPOSITE_SHARE
+    thickness = proposal.thickness if proposal.thickness >= smallest and is_mortar(shares) else 0.0
     return {
         "sizes": assembly.areas,
         "overlapping": overlaps(assembly, ROUNDING * width),
         "overlap_tolerance": DEFAULT_OVERLAP * width,
-        "joint_thickness": proposal.thickness if proposal.thickness >= smallest and is_mortar else 0.0,
+        "joint_thickness": thickness,
         "joints": proposal.stretches.chosen(proposal.stretches.gaps.max(axis=1) >= smallest),
         "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
-        "joint_rows": _mortar_rows(proposal, smallest, shares[0], is_mortar),
+        "joint_rows": _mortar_rows(proposal, smallest, shares[0], is_mortar=thickness > 0.0),
     }
 
 
-def _mortar_rows(proposal: Proposal, rounding: float, share: float, is_mortar: bool) -> tuple[Row, ...]:
+def _mortar_rows(proposal: Proposal, rounding: float, share: float, *, is_mortar: bool) -> tuple[Row, ...]:
     """Report mortar joints by their thickness, and how they can be closed; thinner ones than rounding [m] are none.
 
     Where gaps are a small share of the length of joints, and on one side of blocks, nothing is proposed.
@@ -201,7 +192,7 @@ def _mortar_rows(proposal: Proposal, rounding: float, share: float, is_mortar: b
     joints = proposal.stretches
     if not len(joints):
         return (("mortar joints", "none: no gaps between facing edges"),)
-    if proposal.thickness < rounding:
+    if 0.0 < proposal.thickness < rounding:
         n = int((joints.gaps.max(axis=1) <= 1.0001 * proposal.thickness).sum())
         gaps = f"{counted(n, 'gap')} of up to {proposal.thickness:.1g} m {'is' if n == 1 else 'are'}"
         said = f"none: {gaps} the rounding of coordinates"
@@ -225,7 +216,7 @@ def _mortar_rows(proposal: Proposal, rounding: float, share: float, is_mortar: b
     if not is_mortar:
         said = f"nothing: gaps are {100.0 * share:.2g} % of the length of joints"
         said += ", most on one side of blocks only, as cracks and openings are"
-        return (*rows, ("proposed", f"{said}; joint_thickness = {proposal.thickness:g} closes them"))
+        return (*rows, ("proposed", f"{said}; joint_thickness = {rounded_up(widest.max() / 1e3):g} closes them"))
     rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))
     if proposal.method == "voronoi":
         rows.append(("", 'closing = "voronoi": faces are not straight, mortar goes to the nearest stone'))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from blockvis.results.ties import ties_at
 from blockvis.text import force_text
 from solver import mechanics
 
+from . import palette
 from .marks import leaving
 from .solid_view import into_sight, kept_blocks
 
@@ -210,6 +211,14 @@ class LoadArrows:
         before = max(place for place in self._loads if place <= _place(increment))
         multiplier = self._multipliers[before]
         return self._loads[before], increment.load_multiplier / multiplier if multiplier else 1.0
+
+
+def load_arrows(
+    response: solver.Response, increments: Sequence[solver.Increment], extent: float, plane: np.ndarray | None = None
+) -> dict[str, LoadArrows]:
+    """Give the arrows of each kind of load, as the palette names them, of which there are any."""
+    found = {kind: LoadArrows(response, increments, extent, plane, dead=kind == "dead") for kind in palette.LOADS}
+    return {kind: loads for kind, loads in found.items() if loads.largest > 0.0}
 
 
 def _in_section(load: ActingLoad, assembly: solver.Assembly, plane: np.ndarray | None) -> ActingLoad:

@@ -21,7 +21,7 @@ from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
 from . import palette
-from .acting_loads import LoadArrows
+from .acting_loads import load_arrows
 from .backfill import fill_bodies
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text, matters
 from .flat_scene import FlatScene
@@ -166,9 +166,7 @@ class Drawer:
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
         extent = float(frame.size.max())
-        self.loads = {
-            kind: LoadArrows(response, increments, extent, self._plane, dead=kind == "dead") for kind in palette.LOADS
-        }
+        self.loads = load_arrows(response, increments, extent, self._plane)
         self._arrow = (ARROW if self._flat else 0.09) * float(frame.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
@@ -450,8 +448,7 @@ class Drawer:
             kind = "area" if self._flat else "line"
             keys.append(Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",)))
         for kind, loads in self.loads.items():
-            if loads.largest > 0.0:
-                keys.append(Key("line", loads.words, palette.LOADS[kind], layers=(f"{kind} top",)))
+            keys.append(Key("line", loads.words, palette.LOADS[kind], layers=(f"{kind} top",)))
         if self._drawn_at is not None:
             layers = ("motion outline", "motion top")
             what = "motion" if self._flat else "motion, blocks drawn after it"
@@ -652,8 +649,6 @@ class Drawer:
     def _draw_loads(self, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray) -> None:
         """Draw loads, live ones times their multiplier, as arrows that end where they act, short of a hinge."""
         for kind, loads in self.loads.items():
-            if loads.largest == 0.0:
-                continue
             tails, tips = loads.arrows(increment, shown)
             if self._flat and len(dots) and len(tips):
                 # The dot of a hinge would hide their heads.

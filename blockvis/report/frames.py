@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.pictures.acting_loads import LoadArrows
+from blockvis.pictures import palette
+from blockvis.pictures.acting_loads import LoadArrows, load_arrows
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.marks import (
     SMALLEST_RESULTANT,
@@ -33,8 +34,8 @@ def model_of_frames(
     """Pack what moves, frame after frame, and the scales of all; points ``held`` (n, d) [m] are in the page, too."""
     assembly = response.assembly
     frame, largest, widest, farthest = _surveyed(assembly, joints, shown)
-    live = LoadArrows(response, shown, float(frame.size.max()))
-    frame = frame.holding(np.concatenate([live.tails, held]))
+    loads = load_arrows(response, shown, float(frame.size.max()))
+    frame = frame.holding(np.concatenate([*(load.tails for load in loads.values()), held]))
     # Coordinates far from the origin (UTM) would waste the digits.
     origin, extent = np.round(frame.low, 3), float(frame.size.max())
     unit = FINENESS * extent
@@ -48,7 +49,7 @@ def model_of_frames(
         "largest_displacement": farthest,
         "arrows": _arrows(response, frame, origin),
         "has_forces": bool(len(sizes)),
-        "live_words": live.words if live.largest > 0.0 else "",
+        "loads": [[kind, load.words, palette.hexadecimal(palette.LOADS[kind])] for kind, load in loads.items()],
         "ground": None,
         "fill": None,
         "force_unit": FORCE_FINENESS * largest,
@@ -60,7 +61,7 @@ def model_of_frames(
             "centroids": deflated(rounded(assembly.centroids - origin, unit)),
             "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1)),
             **packed,
-            **_packed_live(live, shown, origin, unit),
+            **_packed_loads(loads, shown, origin, unit),
         },
     }
 
@@ -88,16 +89,17 @@ def _surveyed(
     return frame, largest or 1.0, widest, farthest
 
 
-def _packed_live(live: LoadArrows, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
-    """Arrows of the live load, frame after frame; no more than their first numbers where there are none."""
-    found = [live.arrows(increment, increment.pose) for increment in shown]
-    first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
-    tails, tips = (rounded(np.concatenate(ends) - origin, unit) for ends in zip(*found, strict=True))
-    return {
-        "live_first": deflated(first),
-        "live_tail": deflated(tails),
-        "live_tip": deflated(tips),
-    }
+def _packed_loads(
+    loads: dict[str, LoadArrows], shown: list[solver.Increment], origin: np.ndarray, unit: float
+) -> dict[str, Any]:
+    """Arrows of each kind of load, frame after frame."""
+    packed: dict[str, Any] = {}
+    for kind, load in loads.items():
+        found = [load.arrows(increment, increment.pose) for increment in shown]
+        packed[f"{kind}_first"] = deflated(np.cumsum([0, *(len(tips) for _, tips in found)]))
+        for end, places in zip(("tail", "tip"), zip(*found, strict=True), strict=True):
+            packed[f"{kind}_{end}"] = deflated(rounded(np.concatenate(places) - origin, unit))
+    return packed
 
 
 def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list[list[list[float]]]:

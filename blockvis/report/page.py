@@ -276,7 +276,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
             name: palette.hexadecimal(getattr(palette, name.upper()))
             for name in (
                 "ink", "outline", "support", "moving", "hatch", "open", "sliding", "force", "hinge", "settlement",
-                "crushing", "warning", "live", "lost",
+                "crushing", "warning", "lost",
             )
         },
         "frames": _frames(response, frames),
@@ -291,7 +291,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
 
 
 def _model_in_plane(response: solver.Response, shown: list[solver.Increment], ground: float | None) -> dict[str, Any]:
-    """Pack what only blocks in the plane have: joints as lines, live loads, the ground of a fall."""
+    """Pack what only blocks in the plane have: joints as lines, the ground of a fall."""
     assembly = response.assembly
     joints = initial_joints(assembly)
     tied = DrawnTies(response).ends([shown[0].pose, shown[-1].pose])

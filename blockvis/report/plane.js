@@ -192,7 +192,7 @@
       if (layers.forces && model.fill && !falling) drawFillLoad(pen, near);
       if (layers.hinges) drawDots(pen, near, 1, model.colours.hinge, "#fff");
       drawDots(pen, near, 3, model.colours.crushing, model.colours.hinge);
-      drawLive(pen, near, ([x, y]) => [px(x), py(y)]);
+      drawLoads(pen, near, ([x, y]) => [px(x), py(y)]);
     }
     drawTies(pen, near, colours, ([x, y]) => [px(x), py(y)]);
     scaleBar(pen, w, h, colours);

@@ -79,10 +79,12 @@
     return `rgb(${low.map((v, i) => Math.round(v + (high[i] - v) * (at - k))).join(",")})`;
   }
 
-  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
-  function drawLive(pen, k, onPage) {
+  const loads = model.loads.map(([kind, words, colour]) => (
+    { words, colour, tail: scaled(`${kind}_tail`, q), tip: scaled(`${kind}_tip`, q), first: raw[`${kind}_first`] }));
+  function drawLoads(pen, k, onPage) {
     const d = model.space ? 3 : 2, place = (of, i) => onPage(of.slice(d * i, d * i + d));
-    for (let i = live.first[k]; i < live.first[k + 1]; i++) arrow(pen, ...place(live.tail, i), ...place(live.tip, i), model.colours.live, 2.5);
+    for (const { colour, tail, tip, first } of loads)
+      for (let i = first[k]; i < first[k + 1]; i++) arrow(pen, ...place(tail, i), ...place(tip, i), colour, 2.5);
   }
 
   function spot(pen, x, y, radius, fill, rim) {
@@ -93,12 +95,11 @@
   function arrow(pen, x0, y0, x1, y1, colour, width) {
     const length = norm(x1 - x0, y1 - y0), ux = (x1 - x0) / length, uy = (y1 - y0) / length, head = Math.min(3.6 * width, 0.6 * length);
     if (length < 2) return;
-    pen.strokeStyle = pen.fillStyle = colour; pen.lineWidth = width; pen.lineCap = "butt";
-    pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1 - head * ux, y1 - head * uy); pen.stroke();
-    pen.beginPath(); pen.moveTo(x1, y1);
-    pen.lineTo(x1 - head * ux - 0.5 * head * uy, y1 - head * uy + 0.5 * head * ux);
-    pen.lineTo(x1 - head * ux + 0.5 * head * uy, y1 - head * uy - 0.5 * head * ux);
-    pen.closePath(); pen.fill();
+    const at = (along, across) => [x0 + along * ux - across * uy, y0 + along * uy + across * ux], neck = length - head, w = width / 2;
+    pen.beginPath(); pen.moveTo(...at(0, w));
+    for (const point of [[neck, w], [neck, head / 2], [length, 0], [neck, -head / 2], [neck, -w], [0, -w]]) pen.lineTo(...at(...point));
+    // The rim shows on dark paper, and on blocks of its colour.
+    pen.closePath(); pen.strokeStyle = "#fff"; pen.lineWidth = 1.5; pen.stroke(); pen.fillStyle = colour; pen.fill();
   }
 
   // Ties, props and bars of a frame, each with its force; placed says where a point is on the canvas.
@@ -213,7 +214,7 @@
     if (model.fill && !falling && !model.space) add("area", "fill", model.fill.colours[1]);
     if (model.fill && !falling && model.space && marked) add("line", "edges of the fill", model.fill.colours[2]);
     if (model.fill && model.fill.words && marked && layers.forces && !falling) add("line", model.fill.words, model.fill.colours[2]);
-    if (marked && model.live_words) add("line", model.live_words, model.colours.live);
+    if (marked) for (const { words, colour, first } of loads) if (first[k] < first[k + 1]) add("line", words, colour);
     if (lost[k].size) add("area lost", "lost block", model.colours.lost);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm${falling ? " or more" : ""}`, `linear-gradient(90deg, ${model.ramp.join(",")})`);

@@ -286,7 +286,7 @@
     }
     if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5) {
       if (!falling) drawForces(pen, near);
-      drawLive(pen, near, onPage);
+      drawLoads(pen, near, onPage);
       for (let i = marks.first[near]; i < marks.first[near + 1]; i++) if (marks.kind[i] === 3) spot(pen, ...onPage(marks.place.slice(6 * i, 6 * i + 3)), 5, model.colours.crushing, model.colours.hinge);
     }
     drawTies(pen, near, colours, onPage);

@@ -46,6 +46,11 @@ class _Line:
         self.stream.write(f"\r\x1b[K{bar}{text}" if self.watched else f"blockvis: {text}\n")
         self.stream.flush()
 
+    def left(self, done: int, total: int) -> str:
+        """Say how long the rest will take if it goes on as until now; "" where nothing is done."""
+        seconds = (total - done) * (time.perf_counter() - self.started) / done if done else 0.0
+        return f", about {f'{seconds:.0f} s' if seconds < 100.0 else f'{seconds / 60.0:.0f} min'} left" if done else ""
+
     def clear(self) -> None:
         """Clear the line."""
         if self.watched:
@@ -165,11 +170,14 @@ class Progress:
 
 
 class RunsProgress:
-    """A line that counts runs of which each may take long, and names the one that is waited for."""
+    """A line that counts runs of which each may take long, and names the one that is waited for.
 
-    def __init__(self, *, shown: bool) -> None:
+    They come in rounds, of which each knows of how many runs it is once the one before has ended.
+    """
+
+    def __init__(self, rounds: int, *, shown: bool) -> None:
         self.names: list[str] = []
-        self.count = 0
+        self.rounds, self.round, self.count = rounds, 0, 0
         self._line, self._ended = _Line(), threading.Event()
         self._thread = threading.Thread(target=self._keep_telling, daemon=True) if shown else None
 
@@ -187,8 +195,9 @@ class RunsProgress:
             self._line.clear()
 
     def add(self, names: Sequence[str]) -> None:
-        """Count on so many runs more, by what each is of."""
+        """Begin a round of runs, by what each is of."""
         self.names.extend(names)
+        self.round += 1
 
     def finished(self) -> None:
         """Count a run."""
@@ -198,7 +207,9 @@ class RunsProgress:
         while not self._ended.wait(REDRAW):
             number, total = self.count, len(self.names)
             if self._line.due and number < total:
-                self._line.write(f"run {number + 1} of {total}: {self.names[number]}", number / total)
+                left = self._line.left(number, total)
+                left += f" in round {self.round} of {self.rounds}" if left and self.round < self.rounds else ""
+                self._line.write(f"run {number + 1} of {total}: {self.names[number]}{left}", number / total)
 
 
 class StudyProgress:
@@ -215,9 +226,8 @@ class StudyProgress:
         self.failed += failed
         done = self.before + self.count
         if self.shown and (self._line.due or done == self.total):
-            rest = (self.total - done) * (time.perf_counter() - self._line.started) / self.count
             without = f", {self.failed} without result" if self.failed else ""
-            text = f"run {done} of {self.total}{without}, about {rest:.0f} s left"
+            text = f"run {done} of {self.total}{without}{self._line.left(self.count, self.total - self.before)}"
             self._line.write(text, done / max(self.total, 1))
 
     def done(self) -> None:

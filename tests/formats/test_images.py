@@ -555,6 +555,31 @@ def test_paper_that_the_rim_closes_is_no_stone(tmp_path):
     assert max(np.ptp(ring[:, 0]) for ring in layout.outlines) < 0.62
 
 
+@pytest.mark.parametrize("rim", [(3, 3, 3, 3), (40, 2, 9, 1)])
+def test_stones_that_run_into_a_rim_are_stones(tmp_path, capsys, rim):
+    """A rim of the stones' value, as of a canvas, made one face with a hole of those along the border of the image."""
+    wall = np.asarray(drawn_wall()[0])[20:136, 27:273]
+    Image.fromarray(wall).save(tmp_path / "wall.png")
+    bare = read_layout(tmp_path / "wall.png", pixel=0.01)
+    left, top, right, low = rim
+    Image.fromarray(np.pad(wall, ((top, low), (left, right)), constant_values=255)).save(tmp_path / "rim.png")
+    code, out, _ = informed(capsys, tmp_path / "rim.png", "--pixel", 0.01)
+    assert (code, bare.n_blocks) == (0, 16)
+    assert f"rim along the border of the image, {max(rim)} pixels = {max(rim) / 100:g} m wide, was taken off" in out
+    layout = read_layout(tmp_path / "rim.png", pixel=0.01)
+    assert not layout.left_out
+    for one, other in zip(layout.outlines, bare.outlines, strict=True):
+        np.testing.assert_allclose(one - [0.01 * left, 0.01 * low], other, atol=1e-9)
+
+
+@pytest.mark.parametrize("reader", [read, read_layout])
+def test_an_option_that_is_misspelled_is_refused(tmp_path, reader):
+    """Of an image it was passed over without a word."""
+    drawn_wall()[0].save(tmp_path / "wall.png")
+    with pytest.raises(TypeError, match=r"there is no option backgruond .*did you mean .*background"):
+        reader(tmp_path / "wall.png", width=3.0, backgruond="white")
+
+
 def test_a_pinhole_does_not_lose_its_stone(tmp_path):
     image, n = drawn_wall()
     ImageDraw.Draw(image).rectangle((40, 30, 43, 33), fill=0)
@@ -726,7 +751,8 @@ def test_stones_that_run_together_through_open_joints_are_told(tmp_path):
     pixels = np.full((200, 200), 255, dtype=np.uint8)
     for k in range(25, 200, 50):
         pixels[k - 2 : k + 2, 10:190] = pixels[10:190, k - 2 : k + 2] = 0
-    pixels[:, 48:52] = pixels[48:52] = 255
+    for k in (50, 100, 150):
+        pixels[:, k - 2 : k + 2] = pixels[k - 2 : k + 2] = 255
     Image.fromarray(pixels).save(tmp_path / "mask.png")
     with pytest.raises(ValueError, match=r"has holes; .* close the joints, through whose gaps they are one"):
         read_layout(tmp_path / "mask.png", width=1.0, background="black")

@@ -71,7 +71,8 @@ def test_paths(tmp_path, d, area):
         ('<path d="M0 0 L3 3 L3 0 L0 4Z"/>', "crosses itself"),
         ('<path d="M0 0 L3"/>', "too few numbers"),
         ('<polygon points="0 0 1 1 2"/>', "has 5 coordinates, an odd number"),
-        ('<rect width="50%" height="1"/>', "has width='50%'; give a number in user units"),
+        ('<rect width="9em" height="1"/>', "has width='9em'; give a number in user units"),
+        ('<svg width="9"><rect width="9" height="50%"/></svg>', "has height='50%'; give a number in user units"),
         (
             '<rect transform="spin(4) rotate()" width="1" height="1"/>',
             r"has a transform rotate\(\) that cannot be read",
@@ -282,11 +283,27 @@ def test_clones_are_read_where_they_show_their_original(tmp_path):
     assert any("<svg> 't' was skipped: it has no width, height" in note for note in layout.notes)
 
 
+@pytest.mark.parametrize("head", ['viewBox="-2 0 8 6"', 'width="8" height="6"', 'width="8px" height="6"'])
+def test_percentages_are_parts_of_what_the_sheet_shows(tmp_path, head):
+    """As of the white background that programs put behind all, which is a frame around stones."""
+    body = '<rect width="50%" height="50%"/><rect x="4" y="50%" width="1in" height="72pt"/>'
+    body += '<circle cx="75%" cy="1" r="10%"/>'
+    body += '<svg x="5" y="3" width="25%" height="50%" viewBox="0 0 1 1"><rect width="100%" height="100%"/></svg>'
+    layout = read_layout(saved(tmp_path, body, head), unit="m")
+    sizes = [np.ptp(ring, axis=0) for ring in layout.outlines]
+    radius = 0.1 * np.hypot(8, 6) / np.sqrt(2)
+    np.testing.assert_allclose(sizes, [[4, 3], [96, 96], [2 * radius] * 2, [2, 2]], rtol=1e-3)
+    np.testing.assert_allclose(layout.outlines[1].max(axis=0), [100, -3])
+    np.testing.assert_allclose(layout.outlines[2].mean(axis=0), [6, -1], atol=1e-3)
+
+
 def test_an_inner_svg_without_size_is_missed_in_a_note(tmp_path):
     inner = '<svg id="a" width="50%" viewBox="0 0 9 9"><rect width="9" height="9"/></svg><rect width="9" height="9"/>'
     layout = read_layout(saved(tmp_path, inner))
     assert layout.n_blocks == 1
-    assert any("an inner <svg> 'a' was skipped: it has width='50%'; give a number" in note for note in layout.notes)
+    assert any(
+        "an inner <svg> 'a' was skipped: it has no width, height or viewBox above 0" in note for note in layout.notes
+    )
 
 
 def test_lines_of_patterns_that_fill_shapes_are_missed_in_a_note(tmp_path):

@@ -523,6 +523,24 @@ def test_a_pushover_says_which_settlement_it_comes_after(tmp_path):
     assert told == ["the live load comes after a settlement of 0.01 rad"]
 
 
+@pytest.mark.path
+@pytest.mark.parametrize("block", ["pier", "pinnacle"])
+def test_a_control_beside_what_topples_is_told(block, tmp_path, capsys):
+    """The capacity of the pinnacle was lost at a displacement of the pier, which stands, without a word."""
+    two = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 0.2, 1.0), rectangle(1.0, 0.0, 2.0, 1.0), rectangle(-1.0, -1.0, 3.0, 0.0)],
+        roles=["free", "free", "fixed"],
+        names=["pinnacle", "pier", "ground"],
+    )
+    blockvis.save_layout(two, tmp_path / "two.json")
+    text = PUSHED.partition("[geometry.parameters]")[0].replace('layout = "column"', 'file = "two.json"')
+    text += "[material]\nfriction_coefficient = 0.7\n" + PUSHED[len(COLUMN) :].partition("direction")[0]
+    _, summary = ran(text.replace("block 1", block), tmp_path)
+    assert summary["limit_load_multiplier"] == pytest.approx(0.2, abs=1e-6)
+    message = "[control] block = 'pier' is not what the live load moves: 'pinnacle' moves"
+    assert (message in " ".join(capsys.readouterr().err.split())) == (block == "pier")
+
+
 @pytest.mark.slow
 def test_pressure_on_the_top_and_on_an_edge(tmp_path):
     """Pressure p on the flank of b × h overturns it at p h²/2 = W b/2; pressure on the top holds it."""

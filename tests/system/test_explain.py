@@ -192,7 +192,15 @@ def test_runs_that_take_long_are_counted_by_their_causes(folder, tmp_path, monke
     command = ["explain", str(folder / "arch.toml"), "--observed", str(tmp_path / "crack.csv"), "--workers", "1"]
     assert cli.main([*command, "-o", str(tmp_path / "out")]) == 0
     lines = capsys.readouterr().err
-    assert re.search(r"^blockvis: run \d+ of \d+: left springer moves down, friction 0\.7, \d+\.\d s$", lines, re.M)
+    assert re.search(r"^blockvis: run \d+ of \d+: left springer moves down, friction 0\.7, ", lines, re.M)
+    told = re.findall(
+        r"^blockvis: run (\d+) of \d+: .*?(?:, about (\d+ s) left(?: in round (\d) of 3)?)?, [\d.]+ s$", lines, re.M
+    )
+    # Before a run is done nothing is known; after the first rounds more runs follow, beside the likeliest.
+    assert {bool(left) for run, left, _ in told if run == "1"} == {False}
+    assert {bool(left) for run, left, _ in told if run != "1"} == {True}
+    rounds = [int(number or 3) for run, _, number in told if run != "1"]
+    assert (rounds[0], rounds) == (1, sorted(rounds))
 
 
 @pytest.mark.slow

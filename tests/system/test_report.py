@@ -13,6 +13,7 @@ import pytest
 from structures import arch_response, parted, pixels, report_of, wall
 from test_capacity import ARCH, solved
 
+import solver
 from blockvis import show, write_report
 from solver import mechanics
 
@@ -112,9 +113,30 @@ def test_live_load_stands_where_it_acts_at_each_position(tmp_path):
     assert min(map(len, columns)) > 80
     assert columns[1].mean() - columns[0].mean() > 100
     assert max(map(np.ptp, columns)) < 20
-    told = '"live_words":"live load '
+    told = '"loads":[["live","live load '
     assert told in page.read_text(encoding="utf-8")
     assert told not in report_of(arch_response())
+
+
+@browser
+def test_dead_loads_stand_on_what_they_load(tmp_path):
+    """Blocks go down under their arrows, which have their length: 4 kN on the top of a stack, beside its weight."""
+    boxes = [[[0, y], [1, y], [1, y + 0.5], [0, y + 0.5]] for y in (0.0, 0.5, 1.0, 1.5)]
+    stack = solver.Assembly.from_outlines(boxes, roles=["moving", "free", "free", "free"])
+    dead = solver.self_weight(stack).dead
+    dead[3, 1] -= 4000.0
+    sinks = solver.Settlement(direction=(0, -1), increment=0.3, limit=0.3)
+    response = solver.settle(stack, sinks, loads=solver.Loads(dead, 0.0 * dead), friction_coefficient=0.6)
+    page = write_report(response, tmp_path / "report.html")
+    rows = []
+    for k in (0, len(response.path) - 1):
+        visited(page, tmp_path, f"--screenshot={tmp_path / str(k)}.png", anchor=f"#frame={k}")
+        picture = pixels(tmp_path / f"{k}.png")[:630]
+        rows.append(np.nonzero((np.abs(picture - (120, 66, 0)) < 30).all(axis=2))[0])
+    assert min(map(len, rows)) > 80
+    assert rows[1].max() - rows[0].max() > 10
+    assert abs(np.ptp(rows[1]) - np.ptp(rows[0])) <= 1
+    assert '"loads":[["dead","dead load, longest arrow 4 kN"' in page.read_text(encoding="utf-8")
 
 
 @browser

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from structures import drawn
+from structures import drawn, rectangle
 
 import solver
-from blockvis import inspect, save_layout
+from blockvis import inspect, read, save_layout
 from blockvis.cli import main
 
 FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
@@ -81,6 +81,20 @@ def test_mortar_in_a_part_of_a_dry_wall_is_proposed(tmp_path, digits):
     rings = _running_bond(lambda brick, i, course: brick + inwards * (1 < i < 4 and 3 < course < 6))
     found = inspect(drawn(tmp_path / "wall.json", [np.round(ring, digits) for ring in rings]))
     assert found.joint_thickness == pytest.approx(0.01, abs=1e-3)
+
+
+@pytest.mark.parametrize("joint", [0.0, 0.01])
+def test_a_gap_beside_a_pilaster_is_no_joint(tmp_path, joint):
+    """It was closed by "auto", which moved both sides by half of it: it is wide, and on one side of its stones."""
+    stones = [(x + 0.5 * (y % 2), y, 1.0) for y in range(9) for x in range(5)]
+    stones += [(5.0 * (1 - y % 2), y, 0.5) for y in range(9)]
+    pilaster = [(5.6, y, 0.6) for y in range(9)]
+    half = joint / 2.0
+    rings = [rectangle(x + half, 0.4 * y + half, x + w - half, 0.4 * (y + 1) - half) for x, y, w in stones + pilaster]
+    wall = drawn(tmp_path / "wall.json", rings)
+    assert inspect(wall).joint_thickness == pytest.approx(joint)
+    closed = read(wall, joint_thickness="auto", roles={"block 0": "fixed"})
+    assert closed.vertices[closed.block_of_vertex >= len(stones), 0].min() == pytest.approx(5.6 + half)
 
 
 def test_picture(layout, tmp_path):

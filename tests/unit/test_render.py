@@ -309,7 +309,7 @@ def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, words):
     ]
     report = report_of(response).replace(" ", "")
     assert '"roles":[1,0]' in report
-    assert '"live_words":""' not in report
+    assert '"loads":[["live","liveload·α"' in report
 
 
 def test_what_does_not_stand_before_its_limit_load_is_told_as_that(tmp_path, words):

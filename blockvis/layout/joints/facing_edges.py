@@ -17,6 +17,14 @@ FACING = -0.8
 #: Share of the length of all joints that is no wider than the proposed thickness, wedges apart.
 JOINTS = 0.98
 
+#: Gaps wider than this part of the width of a typical block are joints where they are mortar alone.
+WIDEST_JOINT = 0.2
+
+#: Gaps are mortar where this share of the length of all joints is open, or where this share of the open length has
+#: as much on the other side of its block, more than beside a single row of stones; else they are openings, cracks or
+#: wedges, and stay as drawn.
+MORTAR_SHARE, OPPOSITE_SHARE = 0.15, 0.6
+
 #: Wedges between voussoirs widen by up to this factor beyond the joints.
 WEDGE = 1.5
 
@@ -178,7 +186,8 @@ def proposed_thickness(outlines: Sequence[np.ndarray], laid: np.ndarray | None =
     Edges face each other across at most half the width of a typical block (twice its area over its perimeter): a
     wider gap is an opening. Joints are longer than wide; what is not, such as the way across a crossing from one
     bevelled corner to another, says nothing of them. Of the joints, the share JOINTS of their length bounds the
-    thickness, and wedges up to WEDGE times wider still belong to it. The thickness is rounded up to two digits.
+    thickness, and wedges up to WEDGE times wider still belong to it; gaps above WIDEST_JOINT that are no mortar, as
+    beside a pilaster, are none of them. The thickness is rounded up to two digits, and 0 where nothing else is open.
     """
     found = facing_edges(outlines, search_reach(outlines), laid=laid)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
@@ -189,8 +198,12 @@ def proposed_thickness(outlines: Sequence[np.ndarray], laid: np.ndarray | None =
     widest = found.gaps.max(axis=1)
     joints = found.lengths >= widest
     joints = joints if joints.any() else np.ones(len(found), dtype=bool)
-    width = widest[joints]
-    common = common_width(width, found.lengths[joints], JOINTS)
+    width, length, limit = widest[joints], found.lengths[joints], 2.0 * WIDEST_JOINT * search_reach(outlines)
+    if (width > limit).any() and not is_mortar(open_shares(outlines, found, limit)):
+        length = np.where(width > limit, 0.0, length)
+    if not length.any():
+        return 0.0, found
+    common = common_width(width, length, JOINTS)
     return rounded_up(float(width[width <= WEDGE * common].max())), found
 
 
@@ -239,3 +252,8 @@ def open_shares(outlines: Sequence[np.ndarray], found: Facing, rounding: float) 
     sides, lengths = np.concatenate([wide.edge_a, wide.edge_b]), np.tile(wide.lengths, 2)
     along = [np.bincount(edges.block[sides], lengths * axis) for axis in edges.directions[sides].T]
     return length / every, 1.0 - float(np.hypot(*along).sum() / lengths.sum())
+
+
+def is_mortar(shares: tuple[float, float]) -> bool:
+    """Whether gaps of these :func:`open_shares` are mortar."""
+    return shares[0] >= MORTAR_SHARE or shares[1] >= OPPOSITE_SHARE
