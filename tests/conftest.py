@@ -1,5 +1,7 @@
 """What tests share: solved structures, their results folders, a Dask cluster."""
 
+from __future__ import annotations
+
 import gc
 import os
 import pkgutil
@@ -13,7 +15,6 @@ from typing import Any
 os.environ.update({"OPENBLAS_NUM_THREADS": "1"} if "PYTEST_XDIST_WORKER" in os.environ else {})
 
 import pytest
-import structures
 from hypothesis import settings
 
 import blockvis
@@ -46,6 +47,9 @@ def pytest_collection_finish() -> None:
 @pytest.fixture(scope="session")
 def arch() -> solver.Response:
     """The reference arch: 12 voussoirs, friction coefficient 0.6, its right springer spreads until it collapses."""
+    # Here, as below: the process that workers wait for reads this file and solves nothing.
+    import structures
+
     return structures.arch_response()
 
 
@@ -78,5 +82,7 @@ def words(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a Dask scheduler with two workers, for studies that kill neither; idle ones would cost time, too."""
+    import structures
+
     with structures.started_cluster(tmp_path_factory.mktemp("dask")) as (address, _, _):
         yield address

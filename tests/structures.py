@@ -1,5 +1,6 @@
 """Structures and responses that several tests look at."""
 
+import ast
 import json
 import os
 import re
@@ -489,3 +490,14 @@ def stored_bytes(path: Path) -> bytes:
         arrays = {name: stored[name] for name in stored.files}
     tree = re.sub(r'"seconds": [^,]*,', "", str(arrays.pop("tree", "")))
     return tree.encode() + b"".join(array.tobytes() for array in arrays.values())
+
+
+def imports_of(path: Path) -> list[ast.stmt]:
+    """Statements of a Python file that import, anywhere, in scripts that it holds as text as well.
+
+    To parse them alone takes a tenth of the time that the whole file does.
+    """
+    found = re.findall(
+        r"^[ \t]*((?:from [\w.]+ )?import (?:\([^)]*\)|[^\n]+))", path.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    return ast.parse("\n".join(found)).body

@@ -223,9 +223,9 @@ class FlatScene(Scene):
         ``corners`` are those of the blocks, (n_vertices, 2) [m].
         """
         assembly, following = self.assembly, corners[self.assembly.polygons.next_vertex]
-        lowest = np.minimum.reduceat(assembly.vertices[:, 1], assembly.offsets[:-1])
-        ground = ~assembly.free & (lowest < lowest[assembly.free].min(initial=np.inf))
-        below = ground[assembly.block_of_vertex] & (following[:, 0] > corners[:, 0]) & (corners[:, 1] > self._floor)
+        below = (
+            self._ground[assembly.block_of_vertex] & (following[:, 0] > corners[:, 0]) & (corners[:, 1] > self._floor)
+        )
         top = np.stack([corners[below], following[below]], axis=1)
         foot = np.stack([top[..., 0], np.full(top.shape[:2], self._floor)], axis=2)
         spacing, thin = self._hatching

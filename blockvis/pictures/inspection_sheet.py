@@ -236,10 +236,8 @@ def _add_marks(canvas: _Canvas, contents: Contents) -> list[Any]:
     """Ring places, mark open ends and edges, name blocks at fault beside them; returns entries of the legend."""
     axes, warning, keys = canvas.axes, palette.hexadecimal(palette.WARNING), []
     if len(contents.edges):
-        lines = LineCollection(
-            list(canvas.at(contents.edges)), colors=warning, linewidth=2.2, zorder=5, label="open edges"
-        )
-        lines.set_label(f"edges that are not of two faces: {len(contents.edges)}")
+        told = f"edges that are not of two faces: {len(contents.edges)}"
+        lines = LineCollection(list(canvas.at(contents.edges)), colors=warning, linewidth=2.2, zorder=5, label=told)
         axes.add_collection(lines)
         keys.append(lines)
     if len(contents.ends):

@@ -113,15 +113,8 @@ def draw_mechanism(
     Parameters
     ----------
     response : solver.Response, solver.LimitLoad or solver.Envelope
-    path : path
-    size : (int, int), optional
-        Width and height in pixels; by default as many as of 1920 × 1080, in the proportions of what is shown.
-    underlay : Underlay, optional
-        A photograph under blocks in the plane.
-    view : str or mapping, optional
-        As of :func:`draw_still`.
-    section : str or mapping, optional
-        As of :func:`draw_still`.
+    path, size, underlay, view, section
+        As in :func:`draw_still`.
     """
     return save_picture(mechanism_picture(response, size, underlay=underlay, view=view, section=section), path)
 
@@ -186,12 +179,10 @@ def animate(
         Frames per second; a .gif has 50 at most.
     seconds : float [s]
         Length of the part in equilibrium; of more phases than that as many.
-    magnification, colour_by, forces, joints, curve
+    magnification, colour_by, forces, joints, curve, underlay
         As in :func:`draw_still`.
     fall : Fall, optional
         Worked out already.
-    underlay : Underlay, optional
-        A photograph under blocks in the plane.
     progress : callable, optional
         Called with the frames drawn and their number.
     view, section

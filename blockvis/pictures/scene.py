@@ -39,6 +39,14 @@ class Scene:
         """Pixels; one where the picture is 1080 high."""
         return self.usual_height / 1080.0
 
+    @property
+    def _ground(self) -> np.ndarray:
+        """(n_blocks,) bool array: supports that reach below all free blocks, as ground does."""
+        assembly = self.assembly
+        lowest = np.full(assembly.n_blocks, np.inf)
+        np.minimum.at(lowest, assembly.block_of_vertex, assembly.vertices[:, -1])
+        return ~assembly.free & (lowest < lowest[assembly.free].min(initial=np.inf))
+
     def hide(self, gone: np.ndarray) -> None:
         """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
         self._gone = gone

@@ -181,7 +181,7 @@ class SolidScene(Scene):
         shadow.clear_data()
         shadow.points = self.assembly.vertices * (1.0, 1.0, 0.0) + (0.0, 0.0, height)
         self._add("earth/shadow", shadow, palette.SHADOW, forward=10.0 - IN_FRONT_OF_ALL)
-        self._shadow, self._floor, self._feet = shadow, height, _feet(self.assembly)
+        self._shadow, self._floor, self._feet = shadow, height, _feet(self.assembly, self._ground)
         self._held = np.flatnonzero(~self.assembly.free[self.assembly.block_of_vertex])
 
     def lines(
@@ -494,12 +494,9 @@ def _largest_support(assembly: solver.Assembly) -> float:
     return max((float(np.linalg.norm(span)) for span in spans), default=0.0)
 
 
-def _feet(assembly: solver.Assembly) -> np.ndarray:
-    """(n,) int array: vertices under the supports that reach below all free blocks, as ground does."""
-    shapes, owner, heights = assembly.polyhedra, assembly.block_of_vertex, assembly.vertices[:, 2]
-    lowest = np.full(assembly.n_blocks, np.inf)
-    np.minimum.at(lowest, owner, heights)
-    ground = ~assembly.free & (lowest < lowest[assembly.free].min(initial=np.inf))
+def _feet(assembly: solver.Assembly, ground: np.ndarray) -> np.ndarray:
+    """(n,) int array: vertices under the supports that are ground, (n_blocks,) bool."""
+    shapes, owner = assembly.polyhedra, assembly.block_of_vertex
     upwards = shapes.faces(shapes.vertices).normals[shapes.face_of_corner, 2]
     # Faces that are rather level than upright.
     down, up = (np.unique(shapes.corners[way * upwards > 0.5]) for way in (-1.0, 1.0))

@@ -412,15 +412,15 @@ def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, A
     return {
         # Frames before this one are of phases in another unit.
         "first": before - len(response.path) if len(phases_of(response)) > 1 else 0,
-        "settlement": [float(f"{v:.7g}") for v in x],
-        "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
+        "settlement": _told(x),
+        "reaction": _told(y),
         # The reaction leaves that at rest at once: the way to the next one is dotted.
         "rest": drops_at_start(response),
         # From these on it is along another motion.
         "breaks": new_motions(response),
         # Rows that blocks were lost before, and where.
         "losses": [[row, float(f"{place:.7g}")] for row, place, _ in losses_along(response)],
-        "band": [[float(f"{v:.7g}") for v in row] for row in zip(total, least, most, strict=True)],
+        "band": list(map(_told, zip(total, least, most, strict=True))),
         "collapse": collapse,
         "x_min": first,
         "x_max": widest,
@@ -451,14 +451,15 @@ def _tie_curves(response: solver.Response) -> dict[str, Any] | None:
         "y_max": high + margin,
         "y_ticks": _ticks(low - margin, high + margin, 4),
         "lines": [
-            {
-                "name": name,
-                "colour": palette.hexadecimal(shade),
-                "force": [float(f"{v:.7g}") if np.isfinite(v) else None for v in force],
-            }
+            {"name": name, "colour": palette.hexadecimal(shade), "force": _told(force)}
             for name, shade, force in zip(found.names, palette.TIE_SHADES, forces.T, strict=False)
         ],
     }
+
+
+def _told(values: Iterable[float]) -> list[float | None]:
+    """Round values (n,) to what a curve shows; None where there is none or it is infinite."""
+    return [float(f"{v:.7g}") if math.isfinite(v) else None for v in values]
 
 
 def _ticks(low: float, high: float, n: int) -> list[float]:

@@ -505,6 +505,7 @@ def test_views_that_cannot_be_are_refused_with_the_remedy(tmp_path):
     assert not path.exists()
 
 
+@pytest.mark.slow
 def test_nothing_leaves_the_picture_and_all_frames_look_the_same_way(tmp_path):
     response = vault_response()
     drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.increments)
@@ -523,6 +524,7 @@ def test_nothing_leaves_the_picture_and_all_frames_look_the_same_way(tmp_path):
     assert (first != second).any(axis=2).mean() > 0.02
 
 
+@pytest.mark.slow
 def test_mechanism_is_tinted_and_shows_where_it_goes(tmp_path):
     response = vault_response()
     picture = np.asarray(Image.open(draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL))).astype(int)

@@ -8,6 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from structures import imports_of
 
 import blockvis
 import solver
@@ -95,7 +96,7 @@ def _imported(module: str) -> set[str]:
     """Modules of the two packages, and other packages, that a module imports anywhere."""
     path, found = FILES[module], set()
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in imports_of(path):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -176,6 +177,14 @@ def test_solver_never_imports_blockvis_and_blockvis_takes_public_names_of_solver
             assert not [name for name in names if name.startswith("blockvis") or name == "solver"], module
         else:
             assert not {name for name in names if name.startswith("solver.")} - {"solver.mechanics"}, module
+
+
+def test_solver_imports_nothing_but_its_own_and_six_libraries():
+    allowed = {"numpy", "scipy", "highspy", "clarabel", "manifold3d", "threadpoolctl", "solver"}
+    for module in FILES:
+        if module.startswith("solver"):
+            used = {name.split(".")[0] for name in _imported(module)}
+            assert used <= allowed | sys.stdlib_module_names, module
 
 
 @pytest.mark.parametrize("face", FACES)

@@ -348,15 +348,13 @@ def test_a_block_that_is_lifted_leaves_a_level_crack():
     assert crack.size == pytest.approx(1.0)
 
 
+#: Two stones of running bond, and two above.
+TWO_COURSES = [rectangle(0, 0, 2, 1), rectangle(2, 0, 4, 1), rectangle(0, 1, 3, 2), rectangle(3, 1, 4, 2)]
+
+
 def test_a_stepped_crack_is_one_line_through_joints_that_only_slide():
     """Two courses in running bond; their right ends go: two head joints open, the bed joint between them slides."""
-    outlines = [
-        [[0, 0], [2, 0], [2, 1], [0, 1]],
-        [[2, 0], [4, 0], [4, 1], [2, 1]],
-        [[0, 1], [3, 1], [3, 2], [0, 2]],
-        [[3, 1], [4, 1], [4, 2], [3, 2]],
-    ]
-    assembly = solver.Assembly.from_outlines(outlines)
+    assembly = solver.Assembly.from_outlines(TWO_COURSES)
     (crack,) = cracks_of(assembly, moved(assembly, block_1=(0.02, 0.0, 0.0), block_3=(0.02, 0.0, 0.0)))
     assert crack.width == pytest.approx(0.02)
     np.testing.assert_allclose(crack.ends, [[2, 0], [3, 2]], atol=1e-12)
@@ -403,14 +401,7 @@ def in_space(flat, depth):
 
 
 def test_a_stepped_crack_in_space_is_that_of_the_plane():
-    outlines = [
-        [[0, 0], [2, 0], [2, 1], [0, 1]],
-        [[2, 0], [4, 0], [4, 1], [2, 1]],
-        [[0, 1], [3, 1], [3, 2], [0, 2]],
-        [[3, 1], [4, 1], [4, 2], [3, 2]],
-    ]
-    flat = solver.Assembly.from_outlines(outlines)
-    solid = in_space(flat, 0.5)
+    solid = in_space(solver.Assembly.from_outlines(TWO_COURSES), 0.5)
     (crack,) = cracks_of(solid, moved_in_space(solid, {1: (0.02, 0.0, 0.0), 3: (0.02, 0.0, 0.0)}))
     assert crack.width == pytest.approx(0.02)
     assert len(crack.joints) == 3

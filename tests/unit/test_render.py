@@ -190,7 +190,9 @@ def test_supports_that_settle_under_a_live_load_have_arrows_whatever_the_colours
     assert one == other > 20
 
 
-@pytest.mark.parametrize("acts", ["force = [0, -1000]", "weight_fraction = [0, -0.1]", ""])
+@pytest.mark.parametrize(
+    "acts", ["force = [0, -1000]", pytest.param("weight_fraction = [0, -0.1]", marks=pytest.mark.thorough), ""]
+)
 def test_dead_loads_beside_the_weight_have_arrows_where_they_act(tmp_path, acts):
     case = '[geometry]\nlayout = "portal"\n[settlement]\ndirection = [0, -1]\nlimit = 0.01\n'
     case += f'[[loads]]\nblocks = "lintel"\n{acts}\n' if acts else ""

@@ -268,7 +268,7 @@ def test_a_brick_turned_on_a_brick_bears_on_all_of_both(angle, shift):
     np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("off", [1e-4, 1e-3])
+@pytest.mark.parametrize("off", [pytest.param(1e-4, marks=pytest.mark.thorough), 1e-3])
 @pytest.mark.parametrize("structure", STRUCTURES)
 def test_drawings_a_little_off_keep_their_joints(structure, off):
     """Each stone larger or smaller, shifted and turned by a thousandth: every joint keeps its area and three points."""
@@ -293,7 +293,7 @@ def test_drawings_a_little_off_keep_their_joints(structure, off):
         assert contacts.areas[here].sum() == pytest.approx(expected_area, rel=0.05), (i, j)
 
 
-@pytest.mark.parametrize("scene", range(40))
+@pytest.mark.parametrize("scene", [*range(12), *(pytest.param(k, marks=pytest.mark.thorough) for k in range(12, 40))])
 def test_overlaps_are_those_that_share_volume(scene):
     manifold = pytest.importorskip("manifold3d")
     random = np.random.default_rng(scene)

@@ -1,6 +1,5 @@
 """The walls between the two packages, and what `solver` may do."""
 
-import ast
 import re
 import subprocess
 import sys
@@ -9,16 +8,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-
-
-def test_solver_alone_loads_no_graphics_and_no_files_library():
-    code = (
-        "import sys, solver; "
-        "print(sorted({m.split('.')[0] for m in sys.modules} & "
-        "{'vtk', 'vtkmodules', 'pyvista', 'meshio', 'trimesh', 'shapely', 'ezdxf', 'matplotlib', 'blockvis'}))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
 
 
 HEAVY = {
@@ -36,10 +25,8 @@ LIBRARIES = {"numpy", "scipy", "shapely", "highspy", "clarabel", "threadpoolctl"
 STUDIES = {"dask", "distributed", "pandas", "pyarrow", "SALib", "tomli_w"}
 
 
-@pytest.mark.parametrize(
-    "first", ["import blockvis", *(f"from blockvis.cli import main; main(['{word}'])" for word in ("--help", "laout"))]
-)
-def test_neither_import_nor_help_waits_for_heavy_packages(first):
+@pytest.mark.parametrize("first", [f"from blockvis.cli import main; main(['{word}'])" for word in ("--help", "laout")])
+def test_help_waits_for_no_heavy_packages(first):
     code = f"""
 import sys
 try:
@@ -52,24 +39,6 @@ print(sorted({{name.partition(".")[0] for name in sys.modules}} & {HEAVY | STUDI
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def _imports(path: Path) -> set[str]:
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            names.add("." * node.level + (node.module or ""))
-    return names
-
-
-def test_solver_imports_nothing_but_its_own_and_six_libraries():
-    allowed = {"numpy", "scipy", "highspy", "clarabel", "manifold3d", "threadpoolctl", "solver"}
-    for path in (ROOT / "solver").rglob("*.py"):
-        for name in _imports(path):
-            top = name.split(".")[0]
-            assert name.startswith(".") or top in allowed or top in sys.stdlib_module_names, (path.name, name)
-
-
 def test_solver_opens_no_file_and_prints_nothing():
     for path in (ROOT / "solver").rglob("*.py"):
         assert not re.search(r"(?<![\w.])(?:open|print)\(", path.read_text(encoding="utf-8")), path.name
@@ -80,7 +49,6 @@ def test_blockvis_uses_only_public_names_of_solver():
 
     for path in (ROOT / "blockvis").rglob("*.py"):
         text = path.read_text(encoding="utf-8")
-        assert not re.search(r"(?m)^\s*(from solver\.(?!mechanics import)|import solver\.)", text), path.name
         imported = re.findall(r"(?m)^\s*from solver\.mechanics import (.+)$", text)
         assert {name for names in imported for name in names.split(", ")} <= {*solver.mechanics.__all__}, path.name
         for name in set(re.findall(r"(?<![\w.])solver\.([A-Za-z_]\w*)", text)):

@@ -447,7 +447,7 @@ def test_the_thrust_of_a_dome_whose_springers_begin_to_move_out():
 
 
 @pytest.mark.parametrize("bend", [-0.75, 0.75])
-@pytest.mark.parametrize("first", range(5))
+@pytest.mark.parametrize("first", [0, 2, *(pytest.param(k, marks=pytest.mark.thorough) for k in (1, 3, 4))])
 def test_a_bed_that_bends_by_less_than_a_degree_bears_on_both_faces(bend, first):
     rise = np.tan(np.radians(bend))
     bed = np.roll([(-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0), (-1.0, rise)], first, axis=0)
