@@ -180,7 +180,7 @@ def convex_parts(solids: Solids) -> ConvexParts:
         np.concatenate(weights),
         drawn_face[:, 1] < 0,
         np.unique(drawn_face, axis=0, return_inverse=True)[1].ravel(),
-        np.concatenate([np.pad(k, ((0, 0), (0, n - k.shape[1]), (0, 0)), mode="edge") for k in pieces]),
+        np.concatenate([k.take(np.minimum(np.arange(n), k.shape[1] - 1), axis=1) for k in pieces]),
     )
 
 
@@ -206,8 +206,7 @@ class _Piece:
     @kept
     def normals(self) -> np.ndarray:
         """(m, 3) array: unit normals; zero of triangles without an area, whose direction is rounding."""
-        corners = self.points[self.triangles]
-        arms = np.roll(corners, -1, axis=1) - corners
+        arms = np.roll(self.outlines, -1, axis=1) - self.outlines
         area = cross(arms[:, 0], arms[:, 1])
         length, longest = np.sqrt(dot(area, area)), np.sqrt(dot(arms, arms)).max(axis=1)
         return np.where((length > ON_PLANE * longest)[:, None], unit(area), 0.0)
@@ -217,7 +216,12 @@ class _Piece:
         """(k, 3) array: points of triangles with an area."""
         return self.points[np.unique(self.triangles[self.normals.any(axis=1)])]
 
-    @property
+    @kept
+    def outlines(self) -> np.ndarray:
+        """(m, 3, 3) array: corners around the triangles."""
+        return self.points[self.triangles]
+
+    @kept
     def edges(self) -> np.ndarray:
         """(3 m, 2) int array: first and last point of the edges around all triangles."""
         return self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -318,7 +322,7 @@ def _why(whole: _Piece, total: float, volume: float, size: float, origin: np.nda
 
 def _crossing(piece: _Piece) -> np.ndarray | None:
     """(3,) array: where an edge of a surface passes through one of its triangles; None where none does."""
-    corners = piece.points[piece.triangles]
+    corners = piece.outlines
     edges = np.unique(np.sort(piece.edges, axis=1), axis=0)
     start, end = piece.points[edges[:, 0]], piece.points[edges[:, 1]]
     for (a, b, c), normal, own in zip(corners, piece.normals, piece.triangles, strict=True):
@@ -351,9 +355,10 @@ def _drawn_face(
     """
     arms = face - face[0]
     normal = unit(cross(arms[1:-1], arms[2:]).sum(axis=0))
-    same = (np.abs((whole.points[whole.triangles] - face.mean(axis=0)) @ normal) <= 2.0 * flatness).all(axis=1)
+    middle = face.mean(axis=0)
+    same = (np.abs((whole.outlines - middle) @ normal) <= 2.0 * flatness).all(axis=1)
     same &= whole.normals @ normal > ONE_WAY
-    own = whole.points[whole.triangles[same]]
+    own = whole.outlines[same]
     # They lie apart where an edge of one of them has the other on its outer side.
     apart = np.zeros(len(own), dtype=bool)
     for ring, other in ((np.broadcast_to(face, (len(own), *face.shape)), own), (own, face[None])):
@@ -367,11 +372,12 @@ def _drawn_face(
     between = np.abs(arms - place[..., None] * along).max(axis=2) <= ON_CORNER
     between &= np.abs(place - 0.5) < 0.5 - CORNER_TOLERANCE
     ends = np.sort(np.where(between, place, 1.0), axis=1)[:, : between.sum(axis=1).max()]
-    first, last = np.pad(ends, ((0, 0), (1, 0))), np.pad(ends, ((0, 0), (0, 1)), constant_values=1.0)
-    middle = start + (first + last)[..., None] / 2.0 * along
-    beside = middle + A_LITTLE * (face.mean(axis=0) - middle)
+    ones = np.ones((len(face), 1))
+    first, last = np.hstack([0.0 * ones, ends]), np.hstack([ends, ones])
+    halfway = start + (first + last)[..., None] / 2.0 * along
+    beside = halfway + A_LITTLE * (middle - halfway)
     drawn = (dot(beside[:, :, None, None] - own, outward).max(axis=3) <= ON_PLANE).any(axis=2)
-    arms, along = middle[:, :, None] - edges[:, 0], edges[:, 1] - edges[:, 0]
+    arms, along = halfway[:, :, None] - edges[:, 0], edges[:, 1] - edges[:, 0]
     nearest = np.clip(dot(arms, along) / dot(along, along), 0.0, 1.0)[..., None] * along
     on_edge = (np.abs(arms - nearest).max(axis=3) <= ON_CORNER).any(axis=2)
     kind = np.where(drawn, np.where(on_edge, ENDS, GOES_ON), INSIDE)
@@ -407,41 +413,77 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
     normals, middles = planes.normals[faces], planes.middles[faces]
     if (points @ normals.T - dot(normals, middles)).max(initial=0.0) <= flatness:
         return None
-    starts = piece.points[piece.triangles]
-    ends = np.roll(starts, -1, axis=1)
     edges = _bent_edges(piece, planes.normals, -1.0)
-    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    widths = np.linalg.norm(ends - starts, axis=2)
-    opposite = np.roll(starts, 1, axis=1).reshape(-1, 3)[piece.twins].reshape(-1, 3, 3)
-    convex = dot(opposite - starts, piece.normals[:, None]) < -ON_PLANE
-    sharp = piece.face[:, None] != piece.face[piece.twins // 3].reshape(-1, 3)
+    tried = [(edge[0], normal) for edge in edges[:EDGES_TRIED] for normal in _normals_through(edge, points)]
+    if not tried:
+        return None
+    origins, normals = np.moveaxis(np.array(tried), 1, 0)
+    # Of each plane the heights of all points, of the starts of edges around all triangles, and of their ends.
+    heights = _heights(piece.points, origins, normals)
+    level = heights[:, piece.triangles]
+    beyond = np.roll(level, -1, axis=2)
+    through = (np.minimum(level, beyond) < -ON_PLANE) & (np.maximum(level, beyond) > ON_PLANE)
+    preference = _preference(piece, edges, (origins, normals), level, through)
+    once = piece.edges[:, 0] < piece.edges[:, 1]
+    start, end = piece.edges[once].T
+    crossed = through.reshape(len(tried), -1)[:, once]
+    part = heights[:, start] / np.where(crossed, heights[:, start] - heights[:, end], 1.0)
+    crossings = piece.points[start] + part[..., None] * (piece.points[end] - piece.points[start])
+    sides = [_on_side(piece, sense * level, sense * normals) for sense in (1.0, -1.0)]
     best, smallest, most = None, np.inf, 0.0
-    for edge in edges[:EDGES_TRIED]:
-        for normal in _normals_through(edge, points):
-            level, beyond = (starts - edge[0]) @ normal, (ends - edge[0]) @ normal
-            through = (np.minimum(level, beyond) < -ON_PLANE) & (np.maximum(level, beyond) > ON_PLANE)
-            part = (level[through] / (level[through] - beyond[through]))[:, None]
-            on = starts[through] + part * (ends[through] - starts[through])
-            size = 0.0
-            for sense in (1.0, -1.0):
-                # Corners in the plane belong to the side on which their face is; a face in the plane bounds a side.
-                reaches = (sense * level).max(axis=1) > ON_PLANE
-                lies = (np.abs(level).max(axis=1) <= ON_PLANE) & (sense * (piece.normals @ normal) < -0.5)
-                here = (sense * level >= -ON_PLANE) & (reaches | lies)[:, None]
-                hull = Manifold.hull_points(np.concatenate([starts[here], on])).volume()
-                size += hull if hull > SMALLEST_PART else np.inf
-            # Of cuts that are as good, the one along more re-entrant edges and faces, and through fewer edges.
-            off = (edges - edge[0]) @ normal
-            in_plane, beside = np.abs(off).max(axis=1) <= ON_PLANE, off.min(axis=1) * off.max(axis=1) >= -(ON_PLANE**2)
-            along = length @ (1.0 * in_plane + beside) - THROUGH_EDGE * np.count_nonzero(through & sharp)
-            # A corner that is cut in two meets its neighbours with faces that end in it.
-            third = np.roll(level, 1, axis=1).ravel()
-            split = convex & (np.maximum(np.abs(level), np.abs(beyond)) <= ON_PLANE)
-            along -= widths[split & (third * third[piece.twins] < -(ON_PLANE**2)).reshape(-1, 3)].sum() / 4.0
-            equal = abs(size - smallest) <= ROUNDING * smallest
-            if size < np.inf and (along > most + ON_PLANE if equal else size < smallest):
-                best, smallest, most = (normal, edge[0]), size, along
+    for k in range(len(tried)):
+        on, size = crossings[k, crossed[k]], 0.0
+        for here in sides:
+            hull = Manifold.hull_points(np.concatenate([piece.points[here[k]], on])).volume()
+            size += hull if hull > SMALLEST_PART else np.inf
+            if size > (1.0 + ROUNDING) * smallest:
+                break
+        equal = abs(size - smallest) <= ROUNDING * smallest
+        if size < np.inf and (preference[k] > most + ON_PLANE if equal else size < smallest):
+            best, smallest, most = (normals[k], origins[k]), size, preference[k]
     return best
+
+
+def _on_side(piece: _Piece, level: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(n_planes, n_points) bool array: corners of what a piece has above planes; level as in :func:`_preference`.
+
+    Corners in the plane belong to the side on which their face is; a face in the plane bounds a side.
+    """
+    lies = (np.abs(level).max(axis=2) <= ON_PLANE) & (normals @ piece.normals.T < -0.5)
+    faces = (level.max(axis=2) > ON_PLANE) | lies
+    corner = piece.triangles.ravel()[:, None] == np.arange(len(piece.points))
+    return np.asarray(((level >= -ON_PLANE) & faces[..., None]).reshape(len(level), -1) @ corner)
+
+
+def _heights(points: np.ndarray, origins: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(n_planes, n_points) array: heights of points above planes."""
+    return dot(points - origins[:, None], normals[:, None])
+
+
+def _preference(
+    piece: _Piece,
+    edges: np.ndarray,
+    planes: tuple[np.ndarray, np.ndarray],
+    level: np.ndarray,
+    through: np.ndarray,
+) -> np.ndarray:
+    """(n_planes,) array: of cuts that are as good, the one along more re-entrant edges and faces, and through fewer.
+
+    The re-entrant edges are (n, 2, 3); level and through are (n_planes, m, 3), of the edges around the triangles.
+    """
+    starts, twins = piece.outlines, piece.twins
+    off = _heights(edges.reshape(-1, 3), *planes).reshape(len(level), -1, 2)
+    in_plane, beside = np.abs(off).max(axis=2) <= ON_PLANE, off.min(axis=2) * off.max(axis=2) >= -(ON_PLANE**2)
+    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    sharp = piece.face[:, None] != piece.face[twins // 3].reshape(-1, 3)
+    along = (1.0 * in_plane + beside) @ length - THROUGH_EDGE * np.count_nonzero(through & sharp, axis=(1, 2))
+    # A corner that is cut in two meets its neighbours with faces that end in it.
+    opposite = np.roll(starts, 1, axis=1).reshape(-1, 3)[twins].reshape(-1, 3, 3)
+    convex = dot(opposite - starts, piece.normals[:, None]) < -ON_PLANE
+    third = np.roll(level, 1, axis=2).reshape(len(level), -1)
+    split = convex & (np.maximum(np.abs(level), np.abs(np.roll(level, -1, axis=2))) <= ON_PLANE)
+    split &= (third * third[:, twins] < -(ON_PLANE**2)).reshape(split.shape)
+    return along - (split * np.linalg.norm(np.roll(starts, -1, axis=1) - starts, axis=2)).sum(axis=(1, 2)) / 4.0
 
 
 def _bent_edges(piece: _Piece, normals: np.ndarray, sense: float) -> np.ndarray:
