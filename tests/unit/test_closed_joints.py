@@ -17,6 +17,7 @@ from structures import box, brick, drawn, fans, layout_of
 import solver
 from blockvis import generators, inspect, read, read_layout, run_case, write_layout
 from blockvis.cli import main
+from blockvis.layout import facing
 from blockvis.layout.assemble import assemble
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.facing import faced, facing_tolerance
@@ -729,6 +730,20 @@ def test_facing_never_makes_the_deepest_overlap_deeper(tolerance):
     near = facing_tolerance(solids, 0.0, tolerance)
     found = faced(solids, drawn.names, near)
     assert deepest(found.solids) <= max(deepest(solids), 0.5 * near)
+
+
+@pytest.mark.parametrize("stay", [False, True])
+def test_faces_are_said_to_be_moved_where_a_block_has_moved(stay, monkeypatch):
+    slant = layout_of(generators.build("barrel vault", SMALL["barrel vault"]))
+    solids = shaken(slant, 2e-3).solids
+    if stay:
+        every = {(k - 1, k): 1.0 for k in range(1, len(solids))}
+        depths = iter([every, {}, {}])
+        monkeypatch.setattr(facing, "_depths", lambda *_: next(depths))
+    found = faced(solids, slant.names)
+    assert all(solid is drawn for solid, drawn in zip(found.solids, solids, strict=True)) == stay
+    assert ("moved into one plane" in found.note) == (not stay)
+    assert not stay or f"{len(solids)} blocks stay as drawn" in found.note
 
 
 def test_a_tolerance_does_not_face_less_than_none():
