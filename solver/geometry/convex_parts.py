@@ -206,7 +206,8 @@ class _Piece:
     @kept
     def normals(self) -> np.ndarray:
         """(m, 3) array: unit normals; zero of triangles without an area, whose direction is rounding."""
-        arms = np.roll(self.outlines, -1, axis=1) - self.outlines
+        corners = self.points[self.triangles]
+        arms = np.roll(corners, -1, axis=1) - corners
         area = cross(arms[:, 0], arms[:, 1])
         length, longest = np.sqrt(dot(area, area)), np.sqrt(dot(arms, arms)).max(axis=1)
         return np.where((length > ON_PLANE * longest)[:, None], unit(area), 0.0)
@@ -215,11 +216,6 @@ class _Piece:
     def corners(self) -> np.ndarray:
         """(k, 3) array: points of triangles with an area."""
         return self.points[np.unique(self.triangles[self.normals.any(axis=1)])]
-
-    @kept
-    def outlines(self) -> np.ndarray:
-        """(m, 3, 3) array: corners around the triangles."""
-        return self.points[self.triangles]
 
     @kept
     def edges(self) -> np.ndarray:
@@ -266,7 +262,7 @@ def _parts_of(
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
     planes, flatness = drawn.faces(drawn.vertices), DRAWN_GAP * float(drawn.widths[0])
     whole = _whole(drawn.vertices, loops, planes.normals)
-    edges = _bent_edges(whole, planes.normals, 1.0)
+    edges = whole.points[_bent_edges(whole, planes.normals, 1.0)]
     queue, parts, total, number, inside = [whole], [], 0.0, _flat_faces(whole), count(1)
     while queue:
         piece = queue.pop()
@@ -322,7 +318,7 @@ def _why(whole: _Piece, total: float, volume: float, size: float, origin: np.nda
 
 def _crossing(piece: _Piece) -> np.ndarray | None:
     """(3,) array: where an edge of a surface passes through one of its triangles; None where none does."""
-    corners = piece.outlines
+    corners = piece.points[piece.triangles]
     edges = np.unique(np.sort(piece.edges, axis=1), axis=0)
     start, end = piece.points[edges[:, 0]], piece.points[edges[:, 1]]
     for (a, b, c), normal, own in zip(corners, piece.normals, piece.triangles, strict=True):
@@ -355,10 +351,10 @@ def _drawn_face(
     """
     arms = face - face[0]
     normal = unit(cross(arms[1:-1], arms[2:]).sum(axis=0))
-    middle = face.mean(axis=0)
-    same = (np.abs((whole.outlines - middle) @ normal) <= 2.0 * flatness).all(axis=1)
+    middle, triangles = face.mean(axis=0), whole.points[whole.triangles]
+    same = (np.abs((triangles - middle) @ normal) <= 2.0 * flatness).all(axis=1)
     same &= whole.normals @ normal > ONE_WAY
-    own = whole.outlines[same]
+    own = triangles[same]
     # They lie apart where an edge of one of them has the other on its outer side.
     apart = np.zeros(len(own), dtype=bool)
     for ring, other in ((np.broadcast_to(face, (len(own), *face.shape)), own), (own, face[None])):
@@ -413,81 +409,62 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
     normals, middles = planes.normals[faces], planes.middles[faces]
     if (points @ normals.T - dot(normals, middles)).max(initial=0.0) <= flatness:
         return None
-    edges = _bent_edges(piece, planes.normals, -1.0)
-    tried = [(edge[0], normal) for edge in edges[:EDGES_TRIED] for normal in _normals_through(edge, points)]
+    bent = _bent_edges(piece, planes.normals, -1.0)
+    edges = piece.points[bent[:EDGES_TRIED]]
+    tried = [(edge[0], normal) for edge in edges for normal in _normals_through(edge, points)]
     if not tried:
         return None
-    origins, normals = np.moveaxis(np.array(tried), 1, 0)
-    # Of each plane the heights of all points, of the starts of edges around all triangles, and of their ends.
-    heights = _heights(piece.points, origins, normals)
-    level = heights[:, piece.triangles]
-    beyond = np.roll(level, -1, axis=2)
-    through = (np.minimum(level, beyond) < -ON_PLANE) & (np.maximum(level, beyond) > ON_PLANE)
-    preference = _preference(piece, edges, (origins, normals), level, through)
-    once = piece.edges[:, 0] < piece.edges[:, 1]
-    start, end = piece.edges[once].T
-    crossed = through.reshape(len(tried), -1)[:, once]
-    part = heights[:, start] / np.where(crossed, heights[:, start] - heights[:, end], 1.0)
-    crossings = piece.points[start] + part[..., None] * (piece.points[end] - piece.points[start])
-    sides = [_on_side(piece, sense * level, sense * normals) for sense in (1.0, -1.0)]
+    origins, normals = np.array(tried).swapaxes(0, 1)
+    # Of all planes at once; which edges of triangles run through them, seen from one side of each.
+    heights, (start, end) = dot(piece.points - origins[:, None], normals[:, None]), piece.edges.T
+    at_start, at_end = heights[:, start], heights[:, end]
+    through = (np.minimum(at_start, at_end) < -ON_PLANE) & (np.maximum(at_start, at_end) > ON_PLANE)
+    preference = _preference(piece, bent, heights, through)
+    through &= start < end
+    part = (at_start / np.where(through, at_start - at_end, 1.0))[..., None]
+    crossings = piece.points[start] + part * (piece.points[end] - piece.points[start])
+    sides = [_on_side(piece, sense * heights, sense * normals) for sense in (1.0, -1.0)]
     best, smallest, most = None, np.inf, 0.0
-    for k in range(len(tried)):
-        on, size = crossings[k, crossed[k]], 0.0
-        for here in sides:
-            hull = Manifold.hull_points(np.concatenate([piece.points[here[k]], on])).volume()
-            size += hull if hull > SMALLEST_PART else np.inf
-            if size > (1.0 + ROUNDING) * smallest:
-                break
+    for k, normal in enumerate(normals):
+        corners = (np.concatenate([piece.points[here[k]], crossings[k, through[k]]]) for here in sides)
+        hulls = [Manifold.hull_points(side).volume() for side in corners]
+        size = sum(hulls) if min(hulls) > SMALLEST_PART else np.inf
         equal = abs(size - smallest) <= ROUNDING * smallest
         if size < np.inf and (preference[k] > most + ON_PLANE if equal else size < smallest):
-            best, smallest, most = (normals[k], origins[k]), size, preference[k]
+            best, smallest, most = (normal, origins[k]), size, preference[k]
     return best
 
 
-def _on_side(piece: _Piece, level: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(n_planes, n_points) bool array: corners of what a piece has above planes; level as in :func:`_preference`.
-
-    Corners in the plane belong to the side on which their face is; a face in the plane bounds a side.
-    """
+def _on_side(piece: _Piece, heights: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(n_planes, n_points) bool array: corners, at heights like these, of what a piece has above planes."""
+    level = heights[:, piece.triangles]
+    # Corners in the plane belong to the side on which their face is; a face in the plane bounds a side.
     lies = (np.abs(level).max(axis=2) <= ON_PLANE) & (normals @ piece.normals.T < -0.5)
-    faces = (level.max(axis=2) > ON_PLANE) | lies
+    faces = lies | (level.max(axis=2) > ON_PLANE)
     corner = piece.triangles.ravel()[:, None] == np.arange(len(piece.points))
     return np.asarray(((level >= -ON_PLANE) & faces[..., None]).reshape(len(level), -1) @ corner)
 
 
-def _heights(points: np.ndarray, origins: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(n_planes, n_points) array: heights of points above planes."""
-    return dot(points - origins[:, None], normals[:, None])
-
-
-def _preference(
-    piece: _Piece,
-    edges: np.ndarray,
-    planes: tuple[np.ndarray, np.ndarray],
-    level: np.ndarray,
-    through: np.ndarray,
-) -> np.ndarray:
+def _preference(piece: _Piece, bent: np.ndarray, heights: np.ndarray, through: np.ndarray) -> np.ndarray:
     """(n_planes,) array: of cuts that are as good, the one along more re-entrant edges and faces, and through fewer.
 
-    The re-entrant edges are (n, 2, 3); level and through are (n_planes, m, 3), of the edges around the triangles.
+    The heights of its points are (n_planes, n_points); ``through``, (n_planes, 3 m), is of the edges of its triangles.
     """
-    starts, twins = piece.outlines, piece.twins
-    off = _heights(edges.reshape(-1, 3), *planes).reshape(len(level), -1, 2)
+    (start, end), third, twins = piece.edges.T, np.roll(piece.triangles, 1, axis=1).ravel(), piece.twins
+    off, length = heights[:, bent], np.linalg.norm(np.diff(piece.points[bent], axis=1)[:, 0], axis=1)
     in_plane, beside = np.abs(off).max(axis=2) <= ON_PLANE, off.min(axis=2) * off.max(axis=2) >= -(ON_PLANE**2)
-    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    sharp = piece.face[:, None] != piece.face[twins // 3].reshape(-1, 3)
-    along = (1.0 * in_plane + beside) @ length - THROUGH_EDGE * np.count_nonzero(through & sharp, axis=(1, 2))
+    sharp = np.repeat(piece.face, 3) != piece.face[twins // 3]
+    along = (1.0 * in_plane + beside) @ length - THROUGH_EDGE * np.count_nonzero(through & sharp, axis=1)
     # A corner that is cut in two meets its neighbours with faces that end in it.
-    opposite = np.roll(starts, 1, axis=1).reshape(-1, 3)[twins].reshape(-1, 3, 3)
-    convex = dot(opposite - starts, piece.normals[:, None]) < -ON_PLANE
-    third = np.roll(level, 1, axis=2).reshape(len(level), -1)
-    split = convex & (np.maximum(np.abs(level), np.abs(np.roll(level, -1, axis=2))) <= ON_PLANE)
-    split &= (third * third[:, twins] < -(ON_PLANE**2)).reshape(split.shape)
-    return along - (split * np.linalg.norm(np.roll(starts, -1, axis=1) - starts, axis=2)).sum(axis=(1, 2)) / 4.0
+    opposite = piece.points[third[twins]] - piece.points[start]
+    split = np.abs(heights[:, [start, end]]).max(axis=1) <= ON_PLANE
+    split &= heights[:, third] * heights[:, third[twins]] < -(ON_PLANE**2)
+    split &= dot(opposite, piece.normals.repeat(3, axis=0)) < -ON_PLANE
+    return along - split @ np.linalg.norm(piece.points[end] - piece.points[start], axis=1) / 4.0
 
 
 def _bent_edges(piece: _Piece, normals: np.ndarray, sense: float) -> np.ndarray:
-    """(n, 2, 3) array: ends of edges, longest first, where faces with these normals turn outwards; -1.0 for inwards."""
+    """(n, 2) int array: edges, longest first, where faces with these normals turn outwards; -1.0 for inwards."""
     edges, face, twin = piece.edges, np.repeat(piece.face, 3), piece.twins
     k = np.flatnonzero((edges[:, 0] < edges[:, 1]) & (face < len(normals)) & (face[twin] < len(normals)))
     ends = piece.points[edges[k]]
@@ -495,7 +472,7 @@ def _bent_edges(piece: _Piece, normals: np.ndarray, sense: float) -> np.ndarray:
     length = np.sqrt(dot(along, along))
     turn = dot(cross(normals[face[k]], normals[face[twin[k]]]), along)
     bent = np.flatnonzero(sense * turn > REENTRANT * length)
-    return ends[bent[np.argsort(-length[bent], kind="stable")]]
+    return edges[k[bent[np.argsort(-length[bent], kind="stable")]]]
 
 
 def _normals_through(edge: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -38,6 +38,7 @@ def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -
     areas = np.array([cross(arm[:-1], arm[1:]).sum(axis=0) / 2.0 for arm in arms])
     sizes = np.linalg.norm(areas, axis=1)
     owner = {edge: k for k, face in enumerate(faces) for edge in edges_of(face)}
+    corners, starts = np.concatenate(faces), np.cumsum([0, *map(len, faces[:-1])])
     group = [-1] * len(faces)
     sliver_flatness = SLIVER * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     loops: list[list[int]] = []
@@ -47,15 +48,13 @@ def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -
         group[seed] = seed
         members, queue = [seed], [seed]
         normal, middle = areas[seed] / max(sizes[seed], 1e-300), vertices[faces[seed]].mean(axis=0)
-        out, along = np.abs((vertices - middle) @ normal).tolist(), areas @ normal
-        same_way = ((along > ONE_WAY * sizes) | (sizes <= SLIVER * sizes[seed])).tolist()
+        sliver, out = sizes <= SLIVER * sizes[seed], np.abs((vertices - middle) @ normal)
+        flat = np.maximum.reduceat(out[corners], starts) <= np.where(sliver, sliver_flatness, flatness)
+        same = (flat & (sliver | (areas @ normal > ONE_WAY * sizes))).tolist()
         while queue:
             for a, b in edges_of(faces[queue.pop()]):
                 other = owner[b, a]
-                if group[other] >= 0 or not same_way[other]:
-                    continue
-                sliver = sizes[other] <= SLIVER * sizes[seed]
-                if max(out[corner] for corner in faces[other]) <= (sliver_flatness if sliver else flatness):
+                if group[other] < 0 and same[other]:
                     group[other] = seed
                     members.append(other)
                     queue.append(other)
