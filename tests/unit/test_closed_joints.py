@@ -17,7 +17,6 @@ from structures import box, brick, drawn, fans, layout_of
 import solver
 from blockvis import generators, inspect, read, read_layout, run_case, write_layout
 from blockvis.cli import main
-from blockvis.layout import facing
 from blockvis.layout.assemble import assemble
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.facing import faced, facing_tolerance
@@ -739,7 +738,7 @@ def test_faces_are_said_to_be_moved_where_a_block_has_moved(stay, monkeypatch):
     if stay:
         every = {(k - 1, k): 1.0 for k in range(1, len(solids))}
         depths = iter([every, {}, {}])
-        monkeypatch.setattr(facing, "_depths", lambda *_: next(depths))
+        monkeypatch.setattr("blockvis.layout.facing._depths", lambda *_: next(depths))
     found = faced(solids, slant.names)
     assert all(solid is drawn for solid, drawn in zip(found.solids, solids, strict=True)) == stay
     assert ("moved into one plane" in found.note) == (not stay)
