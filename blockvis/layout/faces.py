@@ -97,33 +97,24 @@ def moved_to_planes(
     bool array.
     """
     before = np.zeros(len(planes), dtype=bool) if first is None else first
-    around: list[list[int]] = [[] for _ in points]
-    for number, face in enumerate(faces):
-        for corner in face:
-            around[corner].append(number)
-    moved = points.copy()
-    for corner, met in enumerate(around):
-        if met:
-            chosen = before[met] if len(met) > 3 and before[met].any() else np.ones(len(met), dtype=bool)
-            for some in (chosen, ~chosen):
-                moved[corner] += _towards(moved[corner], planes[met], some, chosen)
+    corner = np.concatenate([np.asarray(face, dtype=np.int64) for face in faces])
+    number = np.repeat(np.arange(len(faces)), [len(face) for face in faces])
+    # The planes around each corner, in the first columns of its row.
+    order = np.argsort(corner, kind="stable")
+    counts = np.bincount(corner, minlength=len(points))
+    met = np.arange(max(int(counts.max()), 3)) < counts[:, None]
+    around = np.zeros(met.shape, dtype=np.int64)
+    around[met] = number[order]
+    normals, distances, chosen = planes[around, :3], planes[around, 3], met & before[around]
+    chosen = np.where(((counts > 3) & chosen.any(axis=1))[:, None], chosen, met)
+    held, moved = normals * chosen[..., None], points.copy()
+    _, sizes, axes = np.linalg.svd(held)
+    # What planes hold a corner in is no way for the others.
+    along = axes * (sizes <= UNDETERMINED * sizes[:, :1])[..., None]
+    for some, ways in ((chosen, held), (met & ~chosen, normals * (met & ~chosen)[..., None] @ along.mT @ along)):
+        missing = (distances - (normals @ moved[..., None])[..., 0]) * some
+        moved += (np.linalg.pinv(ways, rcond=UNDETERMINED) @ missing[..., None])[..., 0]
     return moved
-
-
-def _towards(point: np.ndarray, planes: np.ndarray, some: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """(3,) array: the way of a point to some of the planes, along those that hold it already."""
-    if not some.any():
-        return np.zeros(3)
-    normals = planes[some, :3]
-    missing = planes[some, 3] - normals @ point
-    if some is held:
-        return np.asarray(np.linalg.lstsq(normals, missing, rcond=UNDETERMINED)[0])
-    _, sizes, axes = np.linalg.svd(planes[held, :3])
-    rank = int((sizes > UNDETERMINED * sizes[0]).sum())
-    free = axes[rank:].T
-    if free.shape[1] == 0:
-        return np.zeros(3)
-    return np.asarray(free @ np.linalg.lstsq(normals @ free, missing, rcond=UNDETERMINED)[0])
 
 
 def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.ndarray]:

@@ -105,10 +105,9 @@ def faced(
     a, b = names[faces.block[one[worst]]], names[faces.block[other[worst]]]
     what = "overlapping" if apart[worst] < 0 else "open"
     rough_joints = counted(n, "joint between faces was", "joints between faces were")
-    note = (
-        f"{rough_joints} not plane, {what} by up to {abs(apart[worst]):.3g} m ('{a}' and '{b}'); "
-        "their faces were moved into one plane each"
-    )
+    note = f"{rough_joints} not plane, {what} by up to {abs(apart[worst]):.3g} m ('{a}' and '{b}')"
+    if any(solid is not drawn for solid, drawn in zip(moved, solids, strict=True)):
+        note += "; their faces were moved into one plane each"
     if kept:
         note += (
             f"; {counted(len(kept), 'block stays', 'blocks stay')} as drawn, which overlap less so ('{names[kept[0]]}')"

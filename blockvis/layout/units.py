@@ -160,6 +160,23 @@ def units_instead(unit: str, size: float, *, page: bool = False) -> list[str]:
     return _masonry_units(size / metres_per(unit), (*RARE, "km"))
 
 
+def doubt_of_given(unit: str, size: float) -> str:
+    """Doubt a unit that was asked for and makes blocks of no common size [m], as a metric one would not.
+
+    A number of units is a scale that was thought of; "" if there is nothing to doubt.
+
+    Examples
+    --------
+    >>> doubt_of_given("mm", 0.026)
+    'unit mm in doubt, in which it is read as asked: it makes the median block 0.026 m across; cm would make it 0.26 m'
+    """
+    if unit not in UNITS or size <= 0.0 or COMMON[0] <= size <= COMMON[1]:
+        return ""
+    others = _masonry_units(size / metres_per(unit), ())
+    said = f"unit {unit} in doubt, in which it is read as asked: it makes the median block {size:.3g} m across"
+    return f"{said}; {_would_make(others, size / metres_per(unit))}" if others else ""
+
+
 def doubt(
     unit: str,
     size: float,

@@ -180,7 +180,7 @@ def convex_parts(solids: Solids) -> ConvexParts:
         np.concatenate(weights),
         drawn_face[:, 1] < 0,
         np.unique(drawn_face, axis=0, return_inverse=True)[1].ravel(),
-        np.concatenate([np.pad(k, ((0, 0), (0, n - k.shape[1]), (0, 0)), mode="edge") for k in pieces]),
+        np.concatenate([k.take(np.minimum(np.arange(n), k.shape[1] - 1), axis=1) for k in pieces]),
     )
 
 
@@ -217,7 +217,7 @@ class _Piece:
         """(k, 3) array: points of triangles with an area."""
         return self.points[np.unique(self.triangles[self.normals.any(axis=1)])]
 
-    @property
+    @kept
     def edges(self) -> np.ndarray:
         """(3 m, 2) int array: first and last point of the edges around all triangles."""
         return self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -262,7 +262,7 @@ def _parts_of(
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
     planes, flatness = drawn.faces(drawn.vertices), DRAWN_GAP * float(drawn.widths[0])
     whole = _whole(drawn.vertices, loops, planes.normals)
-    edges = _bent_edges(whole, planes.normals, 1.0)
+    edges = whole.points[_bent_edges(whole, planes.normals, 1.0)]
     queue, parts, total, number, inside = [whole], [], 0.0, _flat_faces(whole), count(1)
     while queue:
         piece = queue.pop()
@@ -351,9 +351,10 @@ def _drawn_face(
     """
     arms = face - face[0]
     normal = unit(cross(arms[1:-1], arms[2:]).sum(axis=0))
-    same = (np.abs((whole.points[whole.triangles] - face.mean(axis=0)) @ normal) <= 2.0 * flatness).all(axis=1)
+    middle, triangles = face.mean(axis=0), whole.points[whole.triangles]
+    same = (np.abs((triangles - middle) @ normal) <= 2.0 * flatness).all(axis=1)
     same &= whole.normals @ normal > ONE_WAY
-    own = whole.points[whole.triangles[same]]
+    own = triangles[same]
     # They lie apart where an edge of one of them has the other on its outer side.
     apart = np.zeros(len(own), dtype=bool)
     for ring, other in ((np.broadcast_to(face, (len(own), *face.shape)), own), (own, face[None])):
@@ -367,11 +368,12 @@ def _drawn_face(
     between = np.abs(arms - place[..., None] * along).max(axis=2) <= ON_CORNER
     between &= np.abs(place - 0.5) < 0.5 - CORNER_TOLERANCE
     ends = np.sort(np.where(between, place, 1.0), axis=1)[:, : between.sum(axis=1).max()]
-    first, last = np.pad(ends, ((0, 0), (1, 0))), np.pad(ends, ((0, 0), (0, 1)), constant_values=1.0)
-    middle = start + (first + last)[..., None] / 2.0 * along
-    beside = middle + A_LITTLE * (face.mean(axis=0) - middle)
+    ones = np.ones((len(face), 1))
+    first, last = np.hstack([0.0 * ones, ends]), np.hstack([ends, ones])
+    halfway = start + (first + last)[..., None] / 2.0 * along
+    beside = halfway + A_LITTLE * (middle - halfway)
     drawn = (dot(beside[:, :, None, None] - own, outward).max(axis=3) <= ON_PLANE).any(axis=2)
-    arms, along = middle[:, :, None] - edges[:, 0], edges[:, 1] - edges[:, 0]
+    arms, along = halfway[:, :, None] - edges[:, 0], edges[:, 1] - edges[:, 0]
     nearest = np.clip(dot(arms, along) / dot(along, along), 0.0, 1.0)[..., None] * along
     on_edge = (np.abs(arms - nearest).max(axis=3) <= ON_CORNER).any(axis=2)
     kind = np.where(drawn, np.where(on_edge, ENDS, GOES_ON), INSIDE)
@@ -407,45 +409,62 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
     normals, middles = planes.normals[faces], planes.middles[faces]
     if (points @ normals.T - dot(normals, middles)).max(initial=0.0) <= flatness:
         return None
-    starts = piece.points[piece.triangles]
-    ends = np.roll(starts, -1, axis=1)
-    edges = _bent_edges(piece, planes.normals, -1.0)
-    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    widths = np.linalg.norm(ends - starts, axis=2)
-    opposite = np.roll(starts, 1, axis=1).reshape(-1, 3)[piece.twins].reshape(-1, 3, 3)
-    convex = dot(opposite - starts, piece.normals[:, None]) < -ON_PLANE
-    sharp = piece.face[:, None] != piece.face[piece.twins // 3].reshape(-1, 3)
+    bent = _bent_edges(piece, planes.normals, -1.0)
+    edges = piece.points[bent[:EDGES_TRIED]]
+    tried = [(edge[0], normal) for edge in edges for normal in _normals_through(edge, points)]
+    if not tried:
+        return None
+    origins, normals = np.array(tried).swapaxes(0, 1)
+    # Of all planes at once; which edges of triangles run through them, seen from one side of each.
+    heights, (start, end) = dot(piece.points - origins[:, None], normals[:, None]), piece.edges.T
+    at_start, at_end = heights[:, start], heights[:, end]
+    through = (np.minimum(at_start, at_end) < -ON_PLANE) & (np.maximum(at_start, at_end) > ON_PLANE)
+    preference = _preference(piece, bent, heights, through)
+    through &= start < end
+    part = (at_start / np.where(through, at_start - at_end, 1.0))[..., None]
+    crossings = piece.points[start] + part * (piece.points[end] - piece.points[start])
+    sides = [_on_side(piece, sense * heights, sense * normals) for sense in (1.0, -1.0)]
     best, smallest, most = None, np.inf, 0.0
-    for edge in edges[:EDGES_TRIED]:
-        for normal in _normals_through(edge, points):
-            level, beyond = (starts - edge[0]) @ normal, (ends - edge[0]) @ normal
-            through = (np.minimum(level, beyond) < -ON_PLANE) & (np.maximum(level, beyond) > ON_PLANE)
-            part = (level[through] / (level[through] - beyond[through]))[:, None]
-            on = starts[through] + part * (ends[through] - starts[through])
-            size = 0.0
-            for sense in (1.0, -1.0):
-                # Corners in the plane belong to the side on which their face is; a face in the plane bounds a side.
-                reaches = (sense * level).max(axis=1) > ON_PLANE
-                lies = (np.abs(level).max(axis=1) <= ON_PLANE) & (sense * (piece.normals @ normal) < -0.5)
-                here = (sense * level >= -ON_PLANE) & (reaches | lies)[:, None]
-                hull = Manifold.hull_points(np.concatenate([starts[here], on])).volume()
-                size += hull if hull > SMALLEST_PART else np.inf
-            # Of cuts that are as good, the one along more re-entrant edges and faces, and through fewer edges.
-            off = (edges - edge[0]) @ normal
-            in_plane, beside = np.abs(off).max(axis=1) <= ON_PLANE, off.min(axis=1) * off.max(axis=1) >= -(ON_PLANE**2)
-            along = length @ (1.0 * in_plane + beside) - THROUGH_EDGE * np.count_nonzero(through & sharp)
-            # A corner that is cut in two meets its neighbours with faces that end in it.
-            third = np.roll(level, 1, axis=1).ravel()
-            split = convex & (np.maximum(np.abs(level), np.abs(beyond)) <= ON_PLANE)
-            along -= widths[split & (third * third[piece.twins] < -(ON_PLANE**2)).reshape(-1, 3)].sum() / 4.0
-            equal = abs(size - smallest) <= ROUNDING * smallest
-            if size < np.inf and (along > most + ON_PLANE if equal else size < smallest):
-                best, smallest, most = (normal, edge[0]), size, along
+    for k, normal in enumerate(normals):
+        corners = (np.concatenate([piece.points[here[k]], crossings[k, through[k]]]) for here in sides)
+        hulls = [Manifold.hull_points(side).volume() for side in corners]
+        size = sum(hulls) if min(hulls) > SMALLEST_PART else np.inf
+        equal = abs(size - smallest) <= ROUNDING * smallest
+        if size < np.inf and (preference[k] > most + ON_PLANE if equal else size < smallest):
+            best, smallest, most = (normal, origins[k]), size, preference[k]
     return best
 
 
+def _on_side(piece: _Piece, heights: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(n_planes, n_points) bool array: corners, at heights like these, of what a piece has above planes."""
+    level = heights[:, piece.triangles]
+    # Corners in the plane belong to the side on which their face is; a face in the plane bounds a side.
+    lies = (np.abs(level).max(axis=2) <= ON_PLANE) & (normals @ piece.normals.T < -0.5)
+    faces = lies | (level.max(axis=2) > ON_PLANE)
+    corner = piece.triangles.ravel()[:, None] == np.arange(len(piece.points))
+    return np.asarray(((level >= -ON_PLANE) & faces[..., None]).reshape(len(level), -1) @ corner)
+
+
+def _preference(piece: _Piece, bent: np.ndarray, heights: np.ndarray, through: np.ndarray) -> np.ndarray:
+    """(n_planes,) array: of cuts that are as good, the one along more re-entrant edges and faces, and through fewer.
+
+    The heights of its points are (n_planes, n_points); ``through``, (n_planes, 3 m), is of the edges of its triangles.
+    """
+    (start, end), third, twins = piece.edges.T, np.roll(piece.triangles, 1, axis=1).ravel(), piece.twins
+    off, length = heights[:, bent], np.linalg.norm(np.diff(piece.points[bent], axis=1)[:, 0], axis=1)
+    in_plane, beside = np.abs(off).max(axis=2) <= ON_PLANE, off.min(axis=2) * off.max(axis=2) >= -(ON_PLANE**2)
+    sharp = np.repeat(piece.face, 3) != piece.face[twins // 3]
+    along = (1.0 * in_plane + beside) @ length - THROUGH_EDGE * np.count_nonzero(through & sharp, axis=1)
+    # A corner that is cut in two meets its neighbours with faces that end in it.
+    opposite = piece.points[third[twins]] - piece.points[start]
+    split = np.abs(heights[:, [start, end]]).max(axis=1) <= ON_PLANE
+    split &= heights[:, third] * heights[:, third[twins]] < -(ON_PLANE**2)
+    split &= dot(opposite, piece.normals.repeat(3, axis=0)) < -ON_PLANE
+    return along - split @ np.linalg.norm(piece.points[end] - piece.points[start], axis=1) / 4.0
+
+
 def _bent_edges(piece: _Piece, normals: np.ndarray, sense: float) -> np.ndarray:
-    """(n, 2, 3) array: ends of edges, longest first, where faces with these normals turn outwards; -1.0 for inwards."""
+    """(n, 2) int array: edges, longest first, where faces with these normals turn outwards; -1.0 for inwards."""
     edges, face, twin = piece.edges, np.repeat(piece.face, 3), piece.twins
     k = np.flatnonzero((edges[:, 0] < edges[:, 1]) & (face < len(normals)) & (face[twin] < len(normals)))
     ends = piece.points[edges[k]]
@@ -453,7 +472,7 @@ def _bent_edges(piece: _Piece, normals: np.ndarray, sense: float) -> np.ndarray:
     length = np.sqrt(dot(along, along))
     turn = dot(cross(normals[face[k]], normals[face[twin[k]]]), along)
     bent = np.flatnonzero(sense * turn > REENTRANT * length)
-    return ends[bent[np.argsort(-length[bent], kind="stable")]]
+    return edges[k[bent[np.argsort(-length[bent], kind="stable")]]]
 
 
 def _normals_through(edge: np.ndarray, points: np.ndarray) -> np.ndarray:

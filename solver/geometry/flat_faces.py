@@ -8,6 +8,8 @@ import numpy as np
 
 from solver.tolerances import CORNER_TOLERANCE
 
+from .solids import cross
+
 #: Neighbouring faces within the flatness of one plane are one face where their normals differ by less than this cosine;
 #: slivers, whose normals are rounding, are not asked.
 ONE_WAY = 0.999
@@ -33,9 +35,10 @@ def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -
     """One face of neighbouring ones in one plane, up to the flatness [m], and no corner in the middle of an edge."""
     vertices, faces = surface
     arms = (vertices[face[1:]] - vertices[face[0]] for face in faces)
-    areas = np.array([np.cross(arm[:-1], arm[1:]).sum(axis=0) / 2.0 for arm in arms])
+    areas = np.array([cross(arm[:-1], arm[1:]).sum(axis=0) / 2.0 for arm in arms])
     sizes = np.linalg.norm(areas, axis=1)
     owner = {edge: k for k, face in enumerate(faces) for edge in edges_of(face)}
+    corners, starts = np.concatenate(faces), np.cumsum([0, *map(len, faces[:-1])])
     group = [-1] * len(faces)
     sliver_flatness = SLIVER * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     loops: list[list[int]] = []
@@ -45,14 +48,13 @@ def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -
         group[seed] = seed
         members, queue = [seed], [seed]
         normal, middle = areas[seed] / max(sizes[seed], 1e-300), vertices[faces[seed]].mean(axis=0)
+        sliver, out = sizes <= SLIVER * sizes[seed], np.abs((vertices - middle) @ normal)
+        flat = np.maximum.reduceat(out[corners], starts) <= np.where(sliver, sliver_flatness, flatness)
+        same = (flat & (sliver | (areas @ normal > ONE_WAY * sizes))).tolist()
         while queue:
             for a, b in edges_of(faces[queue.pop()]):
                 other = owner[b, a]
-                sliver = sizes[other] <= SLIVER * sizes[seed]
-                same_way = sliver or areas[other] @ normal > ONE_WAY * sizes[other]
-                out = np.abs((vertices[faces[other]] - middle) @ normal).max()
-                flat = out <= (sliver_flatness if sliver else flatness)
-                if group[other] < 0 and same_way and flat:
+                if group[other] < 0 and same[other]:
                     group[other] = seed
                     members.append(other)
                     queue.append(other)
@@ -82,7 +84,7 @@ def _without_straight_corners(vertices: np.ndarray, faces: list[list[int]]) -> l
         before, after = vertices[face[k - 1]], vertices[face[(k + 1) % len(face)]]
         along = after - before
         length = float(np.linalg.norm(along))
-        away = float(np.linalg.norm(np.cross(vertices[corner] - before, along)))
+        away = float(np.linalg.norm(cross(vertices[corner] - before, along)))
         if away <= CORNER_TOLERANCE * length**2:
             faces = [[c for c in face if c != corner] for face in faces]
     return [face for face in faces if len(face) > 2]

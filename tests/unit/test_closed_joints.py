@@ -731,6 +731,20 @@ def test_facing_never_makes_the_deepest_overlap_deeper(tolerance):
     assert deepest(found.solids) <= max(deepest(solids), 0.5 * near)
 
 
+@pytest.mark.parametrize("stay", [False, True])
+def test_faces_are_said_to_be_moved_where_a_block_has_moved(stay, monkeypatch):
+    slant = layout_of(generators.build("barrel vault", SMALL["barrel vault"]))
+    solids = shaken(slant, 2e-3).solids
+    if stay:
+        every = {(k - 1, k): 1.0 for k in range(1, len(solids))}
+        depths = iter([every, {}, {}])
+        monkeypatch.setattr("blockvis.layout.facing._depths", lambda *_: next(depths))
+    found = faced(solids, slant.names)
+    assert all(solid is drawn for solid, drawn in zip(found.solids, solids, strict=True)) == stay
+    assert ("moved into one plane" in found.note) == (not stay)
+    assert not stay or f"{len(solids)} blocks stay as drawn" in found.note
+
+
 def test_a_tolerance_does_not_face_less_than_none():
     solids = layout_of(generators.build("dome", SMALL["dome"])).solids
     assert facing_tolerance(solids, 0.0, 1e-9) == facing_tolerance(solids) < facing_tolerance(solids, 0.0, 1.0) == 1.0
