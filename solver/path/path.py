@@ -305,7 +305,8 @@ class Path:
         if is_far:
             state = self._continue_from(state, resting)
         check = check if carries else self._check(resting, reaction)
-        self.state = replace(state, history=(resting,), peak=max(state.peak, resting.multiplier))
+        # That of a path in motion has viscosity in it.
+        self.state = replace(state, history=(resting,), peak=max(state.peak, check.measured))
         yield self._report(check)
 
     def _report_peak(self, state: PathState) -> Iterator[Increment]:
@@ -318,6 +319,9 @@ class Path:
             lost = standing.bonds.left.sum() < place.bonds.left.sum()
             lost |= np.isnan(standing.tie_lengths).sum() > np.isnan(place.tie_lengths).sum()
             check = self._check(place if lost else standing)
+            # What viscosity has retarded comes to rest nearby.
+            if not check.bounds.in_equilibrium and (resting := self.fall.relaxed(check.place, JUMP)):
+                check = self._check(resting)
             if check.bounds.in_equilibrium and (1.0 - DROP) * check.measured > state.peak:
                 self.state = replace(state, peak=check.measured)
                 yield self._report(check, place)
