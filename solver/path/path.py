@@ -284,16 +284,15 @@ class Path:
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
-        standing = self.stepper.standing(state.place)
-        place = standing or state.place
+        place = (standing := self.stepper.standing(state.place)) or state.place
         reaction = self._reaction(place)
         check = self.checks.check(place, reaction)
-        carries = standing is not None and check.bounds.in_equilibrium
-        carries &= not self.model.has_live or check.bounds.high > 0.0
-        if carries and not self.model.has_live and abs(check.measured - reaction) > self.tolerance * abs(reaction):
+        live, off = self.model.has_live, self.tolerance * abs(reaction)
+        carries = standing is not None and check.bounds.in_equilibrium and (not live or check.bounds.high > 0.0)
+        if carries and not live and abs(check.measured - reaction) > off:
             # Joints that close carry along the path while they are wider open than a computed pose leaves them.
             wider = self.checks.check(place, reaction, CLOSING_GAP)
-            check = wider if wider.measured == reaction else check
+            check = wider if wider.bounds.in_equilibrium and abs(wider.measured - reaction) <= off else check
         resting = place if carries else self.fall.relaxed(place)
         if resting is not None and not carries:
             resting = self.stepper.standing(resting) or resting
@@ -305,7 +304,7 @@ class Path:
         if is_far:
             state = self._continue_from(state, resting)
         check = check if carries else self._check(resting, reaction)
-        self.state = replace(state, history=(resting,), peak=max(state.peak, resting.multiplier))
+        self.state = replace(state, history=(resting,), peak=max(state.peak, check.measured))
         yield self._report(check)
 
     def _report_peak(self, state: PathState) -> Iterator[Increment]:
@@ -315,9 +314,10 @@ class Path:
                 return
             standing = self.stepper.standing(place) or place
             # What breaks as the control stands still has carried until then.
-            lost = standing.bonds.left.sum() < place.bonds.left.sum()
-            lost |= np.isnan(standing.tie_lengths).sum() > np.isnan(place.tie_lengths).sum()
-            check = self._check(place if lost else standing)
+            check = self._check(max(standing, place, key=lambda p: p.bonds.left.sum() - np.isnan(p.tie_lengths).sum()))
+            # What viscosity has retarded comes to rest nearby.
+            if not check.bounds.in_equilibrium and (resting := self.fall.relaxed(check.place, JUMP)):
+                check = self._check(resting)
             if check.bounds.in_equilibrium and (1.0 - DROP) * check.measured > state.peak:
                 self.state = replace(state, peak=check.measured)
                 yield self._report(check, place)

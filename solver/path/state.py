@@ -50,7 +50,7 @@ class PathState:
     refine_until: float = -np.inf  #: [m or rad]: up to here the viscosity stays reduced
     history: tuple[Place, ...] = ()  #: places before, oldest first, to go back to from one without equilibrium
     reported: float = -np.inf  #: [m or rad], parameter of the last increment
-    peak: float = 0.0  #: multiplier above which a peak is reported
+    peak: float = 0.0  #: multiplier above which a peak is reported, as told: that of a place has viscosity in it
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: (n_blocks,), as in :class:`State`
 
     def refuse_other(self, n_blocks: int, n_phases: int) -> None:
