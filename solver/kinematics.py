@@ -163,13 +163,6 @@ def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -
     return after.positions[blocks] + turned(points - before.positions[blocks], turn)
 
 
-def carried_between(
-    points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: Pose, after: Pose
-) -> np.ndarray:
-    """(n, d) array [m]: contact points at another pose, half-way between those that move with either block."""
-    return (carried(points, block_a, before, after) + carried(points, block_b, before, after)) / 2.0
-
-
 def swung(pose: Pose, motion: np.ndarray) -> Pose:
     """Move each block on the arc about its own pole, so that macro-blocks stay together.
 

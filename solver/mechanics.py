@@ -15,7 +15,6 @@ from .geometry.polyhedra import Polyhedra
 from .interfaces import steep_note
 from .kinematics import (
     carried,
-    carried_between,
     motion_size,
     moved,
     moved_vertices,
@@ -70,7 +69,7 @@ __all__ = [
     "LOAD_POSITION", "MOVING", "PROP", "REACTION", "ROLES", "SETTLEMENT", "SLACK", "TIE", "TIE_KINDS", "YIELDING",
     "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Control", "Ending", "Increments",
     "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes", "State", "Stepper",
-    "StoredState", "TieForces", "block_forces", "carried", "carried_between", "check_settlement", "corners_and_edges",
+    "StoredState", "TieForces", "block_forces", "carried", "check_settlement", "corners_and_edges",
     "counted", "falling_blocks", "features_of", "find_contacts", "is_member", "joined_contacts", "lowest",
     "matched_contacts", "mechanism_of", "member_contacts", "member_forces", "member_states", "minimise", "model_of",
     "motion_size", "moved", "moved_vertices", "overlap_depths", "path_parameters", "point_velocities",

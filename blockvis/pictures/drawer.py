@@ -16,7 +16,7 @@ from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
 from blockvis.results.about import phases_of, settlement_in
 from blockvis.results.cracks import cracks_of, main_areas
-from blockvis.results.joint_faces import initial_joints
+from blockvis.results.joint_faces import carried_between, initial_joints
 from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
@@ -615,7 +615,7 @@ class Drawer:
         size = np.linalg.norm(forces, axis=1)
         kept = size > SMALLEST_RESULTANT * size.max(initial=0.0)
         points, forces, blocks = points[kept], forces[kept], blocks[kept]
-        points = mechanics.carried_between(points, blocks[:, 0], blocks[:, 1], increment.pose, shown)
+        points = carried_between(points, blocks[:, 0], blocks[:, 1], increment.pose, shown)
         half = 0.5 * self.force_scale * forces
         line = np.zeros((0, 2, self.assembly.dimension))
         if self.look.forces == "thrust":

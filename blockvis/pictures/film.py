@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image
 
 import solver
+from blockvis.results.joint_faces import carried_between
 from solver import mechanics
 
 from .captions import matters
@@ -103,7 +104,7 @@ def _with_forces_between(
 ) -> solver.Increment:
     """Put blocks to a pose between two increments, and the forces of both on them, each by its part."""
     early, late = (
-        replace(c, points=mechanics.carried_between(c.points, c.block_a, c.block_b, one.pose, pose))
+        replace(c, points=carried_between(c.points, c.block_a, c.block_b, one.pose, pose))
         for c, one in ((before.contacts, before), (after.contacts, after))
     )
     number, known = mechanics.matched_contacts(late, early)

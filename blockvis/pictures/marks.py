@@ -9,7 +9,7 @@ import shapely
 
 import solver
 from blockvis.results.cracks import SMALLEST_OPENING
-from blockvis.results.joint_faces import TOUCHING, InitialJoints
+from blockvis.results.joint_faces import TOUCHING, InitialJoints, carried_between
 from blockvis.results.joints import carried_faces
 from solver import mechanics
 
@@ -113,7 +113,7 @@ def marks_of(
     That is the increment's own pose, a magnified one, or a later one.
     """
     contacts, mechanism = increment.contacts, mechanics.mechanism_of(assembly, increment)
-    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
+    points = carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
     turning = points[hinge_ends(assembly, increment, mechanism)], points[mechanism.crushing_points]
     cracks = cracks_between(assembly, joints, increment.pose, shown, increment.fallen)
     if assembly.dimension == 2:

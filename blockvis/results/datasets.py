@@ -25,7 +25,7 @@ from blockvis.system.vtk_files import arrays_of, string_array
 from solver import mechanics
 
 from .about import STATIC, Quantities
-from .joint_faces import Rings, initial_joints, lengths_of
+from .joint_faces import Rings, carried_between, initial_joints, lengths_of
 from .joints import joint_states
 from .mechanism_arrays import block_motion, next_places, part_of_friction
 from .tables import own_columns
@@ -257,7 +257,7 @@ def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
     """
     contacts, initial = increment.contacts, solver.Pose.initial(assembly)
     blocks, states = (contacts.block_a, contacts.block_b), joint_states(assembly, initial_joints(assembly), increment)
-    drawn = mechanics.carried_between(contacts.points, *blocks, increment.pose, initial)
+    drawn = carried_between(contacts.points, *blocks, increment.pose, initial)
     on_a, on_b = (mechanics.carried(drawn, block, initial, increment.pose) for block in blocks)
     moved, normal = on_a - on_b, states.normals[states.of_contact]
     return np.asarray(moved - (moved * normal).sum(axis=1)[:, None] * normal)
@@ -273,7 +273,7 @@ def _grid_between(
 ) -> vtkUnstructuredGrid:
     """Make a grid of cells whose points lie between two blocks each, (n_points,) int arrays."""
     grid = _grid_of_cells(rings.points, rings.offsets, kind)
-    drawn = mechanics.carried_between(rings.points, *blocks, increment.pose, solver.Pose.initial(assembly))
+    drawn = carried_between(rings.points, *blocks, increment.pose, solver.Pose.initial(assembly))
     _give_shape(grid, drawn, shape, next_places(assembly, increment, rings.points, *blocks))
     return grid
 

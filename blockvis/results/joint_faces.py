@@ -23,6 +23,14 @@ ALIKE = 0.98
 SMALLEST_FACE = 1e-4
 
 
+def carried_between(
+    points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: solver.Pose, after: solver.Pose
+) -> np.ndarray:
+    """(n, d) array [m]: contact points at another pose, half-way between those that move with either block."""
+    on_a, on_b = (mechanics.carried(points, block, before, after) for block in (block_a, block_b))
+    return (on_a + on_b) / 2.0
+
+
 @dataclass(frozen=True)
 class Rings:
     """Polygons in space, or lines in the plane, as flat arrays."""

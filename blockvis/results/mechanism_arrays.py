@@ -14,6 +14,7 @@ from blockvis.dynamics.fall import falls_from, with_mechanism
 from solver import mechanics
 
 from .about import STATIC, Quantities, losing, quantities_in
+from .joint_faces import carried_between
 
 #: How far the fastest block of a mechanism is swung to be shown, in extents of the structure.
 SWING = 0.05
@@ -68,7 +69,7 @@ def swing_factors(
 def swung_increment(increment: solver.Increment, motion: np.ndarray) -> solver.Increment:
     """Give the blocks of a state after a motion (n_blocks, n_dof), with its contact points carried along."""
     contacts, pose = increment.contacts, mechanics.swung(increment.pose, motion)
-    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
+    points = carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     moved = increment.with_arrays(pose=pose, contacts=replace(contacts, points=points))
     return replace(moved, status=solver.Status.FALLING, programs=0, seconds=0.0, checkpoint=None)
 
