@@ -287,12 +287,13 @@ class Path:
         place = (standing := self.stepper.standing(state.place)) or state.place
         reaction = self._reaction(place)
         check = self.checks.check(place, reaction)
-        live, off = self.model.has_live, self.tolerance * abs(reaction)
+        live, off = self.model.has_live, abs(check.measured - reaction)
         carries = standing is not None and check.bounds.in_equilibrium and (not live or check.bounds.high > 0.0)
-        if carries and not live and abs(check.measured - reaction) > off:
+        if carries and not live and off > self.tolerance * abs(reaction):
             # Joints that close carry along the path while they are wider open than a computed pose leaves them.
             wider = self.checks.check(place, reaction, CLOSING_GAP)
-            check = wider if wider.bounds.in_equilibrium and abs(wider.measured - reaction) <= off else check
+            nearer = abs(wider.measured - reaction) <= self.tolerance * off
+            check = wider if wider.bounds.in_equilibrium and nearer else check
         resting = place if carries else self.fall.relaxed(place)
         if resting is not None and not carries:
             resting = self.stepper.standing(resting) or resting
