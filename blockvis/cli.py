@@ -406,6 +406,7 @@ def _add_render(verbs: Any) -> None:
     render.add_argument(
         "--animation", default="collapse.mp4", help="in OUT: .mp4, .gif, .webp, a folder such as frames/, or none"
     )
+    render.add_argument("--no-film", dest="animation", action="store_const", const="none", help="as --animation none")
     render.add_argument(
         "--magnification", type=_number, default=1.0, help="of displacements; without forces and hinges"
     )
@@ -491,6 +492,7 @@ def _add_compare(verbs: Any) -> None:
     compare.add_argument(
         "--animation", default="compare.mp4", help=".mp4, .gif, .webp, a folder such as frames/, or none"
     )
+    compare.add_argument("--no-film", dest="animation", action="store_const", const="none", help="as --animation none")
     compare.add_argument("--force", action="store_true", help="replace a comparison that is there already")
 
 

@@ -305,7 +305,8 @@ def write_labels(
         for shapes, each, near in ((boxes, HIDDEN, rim), (paths, CROSSED, rim / 2.0)):
             cost += each * shapely.dwithin(shapes[:, None], shapely.linestrings(lines), near).sum(axis=1)
         for other in written:
-            free &= ~((lows < other.high) & (other.low < lows + size)).all(axis=1)
+            # Boxes that touch read as one.
+            free &= ~((lows < other.high + rim) & (other.low < lows + size + rim)).all(axis=1)
             over = _inside(other.leader[:, None], lows, lows + size).any(axis=0)
             cost += CROSSED * (over.astype(int) + _inside(leaders, other.low, other.high).any(axis=0))
         if free.any():

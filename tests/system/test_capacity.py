@@ -95,7 +95,7 @@ def test_limit_load_of_a_block_from_its_case_file(tmp_path, capsys):
     assert len(swung) == summary["n_falling_frames"] > 10
     turns = [i.pose.rotations[0, 0] for i in swung]
     assert all(np.diff(turns) < 0.0)
-    assert main(["render", str(folder), "--animation", "none"]) == 0
+    assert main(["render", str(folder), "--no-film"]) == 0
 
 
 @pytest.mark.thorough

@@ -66,7 +66,7 @@ def test_curves_are_not_joined_where_the_supports_move_otherwise(tmp_path):
     assert response.values[2] * response.values[3] < 0.0
     both = {"one": response, "two": structure.settle(there)}
     folders = [str(blockvis.write(one, tmp_path / name)) for name, one in both.items()]
-    assert main(["compare", *folders, "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    assert main(["compare", *folders, "-o", str(tmp_path / "both"), "--no-film"]) == 0
     curve = (np.abs(pixels(tmp_path / "both" / "curves.png") - np.array((20, 92, 168))).sum(axis=2) == 0)[150:]
     assert 0 < curve.any(axis=1).sum() < 0.2 * len(curve)
 
