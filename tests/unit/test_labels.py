@@ -3,6 +3,7 @@
 import io
 from dataclasses import replace
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -441,6 +442,10 @@ def test_labels_lie_apart_and_tell_by_leaders_where_they_belong():
     for colour in colours:
         assert (pixels == colour).all(axis=2).sum() > 50, "each label has its rim"
     assert (pixels == palette.PAPER).all(axis=2).sum() > 5 * 150
+    rims = [np.argwhere((pixels == colour).all(axis=2)) for colour in colours]
+    for one, other in combinations(rims, 2):
+        beside = np.maximum(one.min(axis=0) - other.max(axis=0), other.min(axis=0) - one.max(axis=0)).max()
+        assert beside > 3, "boxes that touch read as one"
 
 
 def test_every_label_has_a_leader_to_the_place_that_it_names():
