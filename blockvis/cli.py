@@ -1018,14 +1018,19 @@ def _bond(options: argparse.Namespace) -> int:
     from .cases.bonds import bonded, read_bond
     from .cases.toml_table import Table
     from .formats.read import read_outlines, write_layout
+    from .layout.unfilled import walls_to_fill
 
     target = _new_file(options.output, options.force)
     given = dict(_parameter(word) for word in options.parameters)
     # Layers may be called 0 or 1.5.
-    words = {key: str(of) for key, of in given.items() if key in ("walls", "openings") and isinstance(of, int | float)}
+    words: dict[str, Any] = {
+        key: str(of) for key, of in given.items() if key in ("walls", "openings") and isinstance(of, int | float)
+    }
+    outlines = read_outlines(options.drawing, unit=options.unit, **_choice(options))
+    if "walls" not in given and (found := list(walls_to_fill(outlines, pages=False))):
+        words["walls"] = found
+        print(f"blockvis: note: walls = {json.dumps(found)}: outlines with openings in them", file=sys.stderr)
     table = Table(given | words, "bond", Path(options.drawing))
-    choice = _choice(options)
-    outlines = read_outlines(options.drawing, unit=options.unit, **choice)
     layout = bonded(outlines, [read_bond(table)], str(options.drawing), mortar=True)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)

@@ -313,6 +313,9 @@ def test_the_command_writes_the_stones_of_a_drawing(facade, capsys):
     checked(layout, WALL.area - shapely.union_all(OPENINGS).area)
     assert set(layout.groups) == {"A-WALL"}
     assert "an outline of 15.6 m² on layer 'A-WALL' with 3 openings was filled" in capsys.readouterr().err
+    # The wall is found where none is named, as by `blockvis new`.
+    assert bonded(facade, "bond=flemish", 'openings=["A-WIN", "A-DOOR"]').groups == layout.groups
+    assert 'note: walls = ["A-WALL"]: outlines with openings in them' in capsys.readouterr().err
 
 
 @pytest.mark.thorough
