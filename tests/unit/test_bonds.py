@@ -417,7 +417,6 @@ def test_the_unit_of_the_drawing_holds(tmp_path):
             ["walls=A-WALL", "openings=A-WNI"],
             r"openings = 'A-WNI' matches no closed outline; the drawing has 'A-WIN' \(2\)",
         ),
-        (["bond=flemish"], r"\[bond\] walls is missing; name layers of the drawing"),
         (["walls=A-WALL", "brik=1"], r"\[bond\] brik is not a key here \(did you mean 'brick'\?\)"),
     ],
 )
@@ -426,6 +425,11 @@ def test_the_command_refuses_in_one_line(facade, words, message, capsys):
     said = capsys.readouterr().err.strip().splitlines()
     assert len(said) == 1
     assert re.search(message, said[0])
+
+
+def test_walls_without_openings_are_asked_for(tmp_path, capsys):
+    bonded(drawn(tmp_path / "two.dxf", ("A", shapely.box(0, 0, 2, 1)), ("A", shapely.box(0, 1, 2, 2))), code=2)
+    assert re.search(r"\[bond\] walls is missing; name layers of the drawing", capsys.readouterr().err)
 
 
 def test_an_opening_outside_and_an_open_outline_are_named_with_their_place(tmp_path, capsys):
