@@ -21,7 +21,7 @@ from .linked import linked
 from .notes import CHANGED, LEFT_OUT, SPECK, UNIT, Note
 from .outlines import ROUNDING, ring_area, ring_width
 from .unfilled import walls_to_fill
-from .units import doubt, doubt_of_given
+from .units import doubt
 
 #: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
 LINE = 1e-9
@@ -116,8 +116,7 @@ def sorted_out(
 def noted(layout: Layout) -> Layout:
     """Note what is left out, and the doubts that the sizes of the blocks cast on the unit and on their thickness."""
     size = float(np.median(layout.sizes))
-    asked, page = layout.unit_by == "user", layout.unit_by == "page"
-    doubted = doubt_of_given(layout.unit, size) if asked else doubt(layout.unit, size, page=page)
+    doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size, page=layout.unit_by == "page")
     found = [Note(UNIT, words) for words in (doubted, _thickness_doubt(layout, size)) if words]
     found += [Note(SPECK, words) for words in (_specks(layout, size),) if words]
     walls = [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]

@@ -88,7 +88,10 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     if given is not None:
         clash = bool(stated) and metres_per(stated) != metres_per(given)
         note = f"the file says its unit is {stated}; it was read in {given} because that was asked for" if clash else ""
-        return given, Note(UNIT_TAKEN, note) if note else ""
+        # Who gives the unit that the file states has settled the doubt.
+        doubted = "" if given == stated else doubt_of_given(given, median * metres_per(given))
+        said = "; ".join(filter(None, (note, doubted)))
+        return given, Note(UNIT_TAKEN if note else UNIT, said) if said else ""
     if not stated:
         return "m", Note(UNIT_TAKEN, "the file does not say its unit; m was assumed")
     low, high = PLAUSIBLE_SIZE

@@ -311,7 +311,7 @@ def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, words):
     ]
     report = report_of(response).replace(" ", "")
     assert '"roles":[1,0]' in report
-    assert '"loads":[["live","liveload·α"' in report
+    assert '"loads":[["live","liveload\\u00b7\\u03b1",' in report
 
 
 def test_what_does_not_stand_before_its_limit_load_is_told_as_that(tmp_path, words):
