@@ -524,7 +524,7 @@ def test_of_a_drawing_of_lines_the_largest_regions_may_be_openings(tmp_path, sil
         draw.rectangle(box, outline=0, width=2)
     image.save(tmp_path / "lines.png")
     layout = read_layout(tmp_path / "lines.png", pixel=0.01)
-    areas = [abs(float(np.cross(ring, np.roll(ring, -1, axis=0)).sum())) / 2.0 for ring in layout.outlines]
+    areas = [Polygon(ring).area for ring in layout.outlines]
     opening = layout.names[int(np.argmax(areas))]
     (note,) = (note for note in layout.notes if "what lines enclose" in note)
     assert note.startswith("paper around lines, 'stone 1', was left out")
