@@ -645,14 +645,16 @@ def _new(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .layout.ground import ground_of
     from .layout.units import metres_per
+    from .runs.progress import Waiting
     from .system.atomic_files import write_atomic
 
     drawing = Path(options.drawing)
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
     target = _new_file(options.output or f"{stem}.toml", options.force)
     choice = _choice(options)
-    filled = _filled_walls(options, choice)
-    found, walls = filled or (inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice), ())
+    with Waiting(f"reading {drawing.name}"):
+        filled = _filled_walls(options, choice)
+        found, walls = filled or (inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice), ())
     unit, unit_says = ("", "") if walls else unit_instead(found)
     if unit:
         if choice["window"]:
@@ -683,11 +685,13 @@ def _try_new(text: str, target: Path, remark: str, *, drawing: bool) -> None:
     from .layout.layout import layout_of
     from .pictures.inspection import draw_inspection
     from .runs.first_equilibrium import first_equilibrium
+    from .runs.progress import Waiting
 
     try:
-        case = parse_case(text, target)
-        assembly = case_assembly(case)
-        found = first_equilibrium(case, assembly)
+        with Waiting(f"looking whether {target.name} stands"):
+            case = parse_case(text, target)
+            assembly = case_assembly(case)
+            found = first_equilibrium(case, assembly)
     except (ValueError, solver.SolveError) as error:
         print(f"blockvis: note: as it is, blockvis run refuses it: {error}", file=sys.stderr)
         return
@@ -905,10 +909,12 @@ def _info(options: argparse.Namespace) -> int:
     from .layout.refusal import Refused
     from .layout.roles import roles_of
     from .pictures.inspection import draw_inspection, draw_refusal
+    from .runs.progress import Waiting
 
     choice = _choice(options)
     try:
-        found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
+        with Waiting(f"reading {options.file}"):
+            found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
     except Refused as refused:
         if options.picture:
             # Why there is no picture does not replace why there are no blocks.
@@ -933,12 +939,14 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
     from .layout.layout import layout_of
     from .layout.roles import without_twins
+    from .runs.progress import Waiting
 
     target = _new_file(options.target, options.force)
     if (Path(options.source) / "assembly.npz").is_file():
         return _convert_results(options, target)
     choice = _choice(options)
-    layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
+    with Waiting(f"reading {options.source}"):
+        layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
     layout, twins = without_twins(layout, {})
     for note in (*layout.notes, *([twins] if twins else [])):
         print(f"blockvis: note: {note}", file=sys.stderr)
@@ -1019,6 +1027,7 @@ def _bond(options: argparse.Namespace) -> int:
     from .cases.toml_table import Table
     from .formats.read import read_outlines, write_layout
     from .layout.unfilled import walls_to_fill
+    from .runs.progress import Waiting
 
     target = _new_file(options.output, options.force)
     given = dict(_parameter(word) for word in options.parameters)
@@ -1026,7 +1035,8 @@ def _bond(options: argparse.Namespace) -> int:
     words: dict[str, Any] = {
         key: str(of) for key, of in given.items() if key in ("walls", "openings") and isinstance(of, int | float)
     }
-    outlines = read_outlines(options.drawing, unit=options.unit, **_choice(options))
+    with Waiting(f"reading {options.drawing}"):
+        outlines = read_outlines(options.drawing, unit=options.unit, **_choice(options))
     if "walls" not in given and (found := list(walls_to_fill(outlines, pages=False))):
         words["walls"] = found
         print(f"blockvis: note: walls = {json.dumps(found)}: outlines with openings in them", file=sys.stderr)
@@ -1254,6 +1264,8 @@ def _notes_without_repeats() -> Callable[..., None]:
     def show(message: Warning | str, *_: object, **__: object) -> None:
         if str(message) not in said:
             said.add(str(message))
-            print(f"blockvis: note: {message}", file=sys.stderr)
+            # On a terminal a line of what takes long may stand there.
+            clear = "\r\x1b[K" if sys.stderr.isatty() else ""
+            print(f"{clear}blockvis: note: {message}", file=sys.stderr)
 
     return show

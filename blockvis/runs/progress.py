@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
@@ -169,19 +170,14 @@ class Progress:
             self._line.clear()
 
 
-class RunsProgress:
-    """A line that counts runs of which each may take long, and names the one that is waited for.
+class Waiting:
+    """A line that says what takes long, until it is done: nothing of it is counted."""
 
-    They come in rounds, of which each knows of how many runs it is once the one before has ended.
-    """
-
-    def __init__(self, rounds: int, *, shown: bool) -> None:
-        self.names: list[str] = []
-        self.rounds, self.round, self.count = rounds, 0, 0
-        self._line, self._ended = _Line(), threading.Event()
+    def __init__(self, what: str, *, shown: bool = True) -> None:
+        self.what, self._line, self._ended = what, _Line(), threading.Event()
         self._thread = threading.Thread(target=self._keep_telling, daemon=True) if shown else None
 
-    def __enter__(self) -> RunsProgress:
+    def __enter__(self) -> Self:
         """Begin to write now and then."""
         if self._thread is not None:
             self._thread.start()
@@ -194,6 +190,27 @@ class RunsProgress:
             self._thread.join()
             self._line.clear()
 
+    def _keep_telling(self) -> None:
+        while not self._ended.wait(REDRAW):
+            if self._line.due:
+                self.tell()
+
+    def tell(self) -> None:
+        """Write the line."""
+        self._line.write(self.what)
+
+
+class RunsProgress(Waiting):
+    """A line that counts runs of which each may take long, and names the one that is waited for.
+
+    They come in rounds, of which each knows of how many runs it is once the one before has ended.
+    """
+
+    def __init__(self, rounds: int, *, shown: bool) -> None:
+        super().__init__("", shown=shown)
+        self.names: list[str] = []
+        self.rounds, self.round, self.count = rounds, 0, 0
+
     def add(self, names: Sequence[str]) -> None:
         """Begin a round of runs, by what each is of."""
         self.names.extend(names)
@@ -203,13 +220,13 @@ class RunsProgress:
         """Count a run."""
         self.count += 1
 
-    def _keep_telling(self) -> None:
-        while not self._ended.wait(REDRAW):
-            number, total = self.count, len(self.names)
-            if self._line.due and number < total:
-                left = self._line.left(number, total)
-                left += f" in round {self.round} of {self.rounds}" if left and self.round < self.rounds else ""
-                self._line.write(f"run {number + 1} of {total}: {self.names[number]}{left}", number / total)
+    def tell(self) -> None:
+        """Write the line while runs are waited for."""
+        number, total = self.count, len(self.names)
+        if number < total:
+            left = self._line.left(number, total)
+            left += f" in round {self.round} of {self.rounds}" if left and self.round < self.rounds else ""
+            self._line.write(f"run {number + 1} of {total}: {self.names[number]}{left}", number / total)
 
 
 class StudyProgress:

@@ -28,7 +28,7 @@ from solver import mechanics
 
 from .outputs import Clock, Drawing, viewer_format
 from .plan import planned
-from .progress import Progress
+from .progress import Progress, Waiting
 from .reopen import open_results
 from .step_check import stored_case
 from .write import finish
@@ -126,7 +126,7 @@ def run_case(
     refuse_results(folder, overwrite)
     outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
     with _begun(case, outputs):
-        with clock.counting("read"):
+        with clock.counting("read"), Waiting(f"reading the blocks of {case.source.name}"):
             assembly = case_assembly(case)
         with clock.counting("solve"):
             run = planned(case, assembly)

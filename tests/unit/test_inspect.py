@@ -1,6 +1,8 @@
 """What ``blockvis info`` says of a file."""
 
+import io
 import re
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +44,26 @@ def test_numbers(layout):
     assert 'joint_thickness = 0.01   (m, or "auto")' in text
     assert "c = b" in text
     assert re.search(r"roles +'free' 3, 'fixed' 1", text)
+
+
+def test_a_file_that_takes_long_to_read_is_named_meanwhile(layout, monkeypatch):
+    monkeypatch.setattr("blockvis.runs.progress.REDRAW", 0.001)
+    monkeypatch.setattr("blockvis.runs.progress.LINES", 0.0)
+    told = threading.Event()
+
+    class Stream(io.StringIO):
+        def write(self, words):
+            if words.startswith(f"blockvis: reading {layout}, "):
+                told.set()
+            return super().write(words)
+
+    def slowly(*given, **options):
+        assert told.wait(timeout=60)
+        return inspect(*given, **options)
+
+    monkeypatch.setattr("blockvis.formats.read.inspect", slowly)
+    monkeypatch.setattr("sys.stderr", Stream())
+    assert main(["info", str(layout)]) == 0
 
 
 @pytest.mark.parametrize(("gaps", "proposed"), [((0.0, 0.0, 0.02, 0.02), 0.0), ((0.0, 0.02, 0.04, 0.06), 0.02)])
