@@ -113,6 +113,9 @@ class Engine:
         if arms is not None:
             self.arms[: len(arms)] = arms / (self.mass * solver.GRAVITY * self.length)
             self.loads = self.loads - mechanics.turned_moments(self.arms, pose)
+        # Moments that stay have no potential in space; those of forces at points, as drawn, are a part of one.
+        one, other = ([0], [1]) if self.d == 2 else ([1, 2, 0], [2, 0, 1])
+        self.lasting = self.loads[:, self.d :] - self.arms[:, one, other] + self.arms[:, other, one]
         self.velocity = np.where(self.free[:, None], velocity * self.unit / self.scales, 0.0)
         moments, self.drawn_axes = principal_inertia(assembly)
         masses = np.repeat(assembly.masses[:, None], self.d, axis=1)
@@ -214,7 +217,8 @@ class Engine:
         late = members & (contacts.gaps > 0.0) & (forces[:, 0] > FORCE)
         if (len(entered) or deeper.any() or late.any()) and h > SHORTEST_STEP:
             return False
-        energies = self.energies
+        gained = (self.lasting * motion[:, self.d :]).sum(axis=1)
+        energies = self.energies + gained * self.mass * solver.GRAVITY * self.length
         self.contacts, self.forces, self.trial = contacts, forces, trial
         self.velocity = np.where(self.free[:, None], velocity + (motion - flight) / h, 0.0)
         self.pose, self.corners = pose, corners

@@ -247,6 +247,52 @@ def test_what_tips_turns_as_the_equation_of_motion_says():
 
 
 @pytest.mark.parametrize(
+    "dimension", [pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.thorough)]
+)
+def test_a_block_in_flight_turns_ever_faster_by_its_moment_and_falls_no_slower(dimension):
+    """It slides off a ledge that is drawn away below it, and keeps a moment of 200 N·m."""
+    drawn = [(0.0, 0.0, 1.0, 0.4), (-1.0, -0.5, 0.55, 0.0), (-0.5, 0.05, 0.0, 0.4), (-9.0, -20.0, 9.0, -19.0)]
+    roles, moment = ["free", "moving", "fixed", "fixed"], -200.0 if dimension == 2 else 200.0
+    if dimension == 2:
+        assembly = solver.Assembly.from_outlines([rectangle(*at) for at in drawn], roles=roles)
+    else:
+        assembly = solver.Assembly.from_solids([box((a, 0, b), (c, 1, d)) for a, b, c, d in drawn], roles=roles)
+    loads = solver.self_weight(assembly)
+    loads.dead[0, 2 * dimension - 2] = moment
+    away = solver.Settlement(direction=(-1, *[0] * (dimension - 1)), increment=0.02, limit=0.5, tolerance=1e-3)
+    fall = fall_of(solver.settle(assembly, away, friction_coefficient=0.15, loads=loads))
+    flight = slice(27, 37)
+    speeds, spins = (np.diff(of[flight, 0], axis=0) / 0.04 for of in (fall.positions, fall.rotations))
+    np.testing.assert_allclose(np.diff(speeds[:, -1]) / 0.04, -solver.GRAVITY, rtol=1e-4)
+    inertia = 0.4 * 2000.0 * (1.0**2 + 0.4**2) / 12.0
+    np.testing.assert_allclose(np.diff(spins[:, dimension - 2]) / 0.04, moment / inertia, rtol=5e-3)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_force_at_a_corner_gives_a_block_in_flight_no_more_than_its_work(dimension):
+    if dimension == 2:
+        block = solver.Assembly.from_outlines([rectangle(0.0, 9.0, 1.0, 9.5)], roles=["free"])
+    else:
+        block = solver.Assembly.from_solids([box((0.0, 0.0, 9.0), (1.0, 0.7, 9.5))], roles=["free"])
+    force = np.array([4000.0, 900.0, -2000.0])[[0, 2] if dimension == 2 else [0, 1, 2]]
+    pushed = solver.PointForces.at(0, force, block.vertices.max(axis=0))
+    loads = solver.self_weight(block).with_forces(block, pushed)
+    whole, pose = on_ground(block, solver.Pose.initial(block), 0.0)
+    dead = np.append(loads.dead, np.zeros((1, 3 * dimension - 3)), axis=0)
+    law, still = solver.Interfaces(solver.InterfaceLaw(0.5)), np.zeros_like(dead)
+    engine = Engine(whole, dead, law, pose, still, arms=loads.dead_arms)
+    energies, heights = [engine.energies.sum()], [engine.pose.positions[0, -1]]
+    for _ in range(12):
+        engine.advance(0.04)
+        energies.append(engine.energies.sum())
+        heights.append(engine.pose.positions[0, -1])
+    assert np.linalg.norm(engine.pose.rotations[0]) > 0.5
+    given = block.masses[0] * solver.GRAVITY * (heights[0] - heights[-1])
+    assert (np.diff(energies) <= 1e-9 * given).all()
+    assert energies[0] - energies[-1] < 0.05 * given
+
+
+@pytest.mark.parametrize(
     "height", [0.5, pytest.param(0.87, marks=pytest.mark.thorough), pytest.param(2.3, marks=pytest.mark.thorough)]
 )
 def test_a_blow_takes_the_speed_along_that_friction_has_by_its_impulse(height):
