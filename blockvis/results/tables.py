@@ -111,8 +111,8 @@ def finite(value: float) -> float | None:
 
 
 def removals(response: solver.Response) -> list[dict[str, Any]]:
-    """Blocks and ties that were taken away before each settlement, its number from 1, and the blocks' weight."""
-    names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
+    """Blocks and ties that were taken away before each settlement, its number from 1, and the free blocks' weight."""
+    names, weights = response.assembly.names, np.where(response.assembly.free, response.assembly.masses, 0.0)
     there, removed, ties = np.ones(len(names), dtype=bool), list[dict[str, Any]](), list(response.ties)
     made = (change for change in response.changes if change.phase <= _last_phase(response))
     for change in sorted(made, key=lambda change: change.phase):
@@ -126,7 +126,7 @@ def removals(response: solver.Response) -> list[dict[str, Any]]:
                     "phase": change.phase + 1,
                     "blocks": [names[k] for k in taken],
                     "ties": [tie.name for tie in gone],
-                    "weight": float(weights[taken].sum()),
+                    "weight": float(weights[taken].sum()) * solver.GRAVITY,
                 }
             )
     return removed

@@ -59,6 +59,17 @@ def test_what_a_prop_carried_goes_to_the_piers_when_it_is_taken_away() -> None:
 
 
 @pytest.mark.slow
+def test_a_support_that_is_taken_away_weighs_nothing_in_note_and_summary(tmp_path: Path) -> None:
+    """As it is no part of the total weight; its thickness nobody has to give."""
+    structure = beam_on_a_prop()
+    roles = np.where(np.array(structure.assembly.names) == "prop", "fixed", structure.assembly.roles)
+    structure = solver.Structure(structure.assembly.with_roles(roles), friction_coefficient=0.6)
+    response = structure.settle([DOWN, DOWN], changes=[taken_away(structure, 1, "prop")])
+    summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
+    assert summary["removed"] == [{"phase": 2, "blocks": ["prop"], "ties": [], "weight": 0.0}]
+    assert any("block 'prop' taken away before settlement 2, 0 N" in note for note in summary["notes"])
+
+
 def test_what_changes_before_a_settlement_is_told_where_the_structure_falls_of_it() -> None:
     """A tie goes, and a load pushes the load off: report and command line named neither."""
     structure = beam_on_a_prop()
