@@ -20,7 +20,8 @@ class Bearing:
 
     name: str
     force: float  #: [N] Normal to its face.
-    pressures: tuple[float, float]  #: [Pa] The mean, and that of the end of a block with the largest.
+    #: [Pa] The mean, and that of the end of a block with the largest, N/A + 2M/(Ab): of a continuous bed it is 6M/(Ab).
+    pressures: tuple[float, float]
     tilt: float  #: [rad] By which a block on it has turned, the largest of them.
 
     def __str__(self) -> str:
