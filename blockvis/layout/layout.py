@@ -93,18 +93,32 @@ class Layout:
             if kind in _UNSAID and not getattr(self, kind):
                 object.__setattr__(self, kind, (_UNSAID[kind],) * self.n_blocks)
             if len(getattr(self, kind)) != self.n_blocks:
-                raise ValueError(
-                    f"{mechanics.counted(self.n_blocks, 'block')} but {len(getattr(self, kind))} {kind}; "
-                    "give one per block"
-                )
+                raise ValueError(self._miscounted(f"{len(getattr(self, kind))} {kind}"))
+        for kind in ("density", "thickness"):
+            if (given := getattr(self, kind)) is not None:
+                numbers = np.array(given, dtype=float)
+                if numbers.shape != (self.n_blocks,):
+                    raise ValueError(self._miscounted(f"{kind} of shape {numbers.shape}"))
+                object.__setattr__(self, kind, numbers)
+        for name, role in zip(self.names, self.roles, strict=True):
+            if role and role not in mechanics.ROLES:
+                raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(mechanics.ROLES)}")
         # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
         note = "characters that the file's encoding does not have are shown as \ufffd"
         for kind in ("names", "groups", "roles", "materials"):
-            words = getattr(self, kind)
+            words = tuple(map(str, getattr(self, kind)))
             whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
-            if whole != tuple(words) and note not in self.notes:
+            if whole != words and note not in self.notes:
                 object.__setattr__(self, "notes", (*self.notes, note))
             object.__setattr__(self, kind, whole)
+
+    def __repr__(self) -> str:
+        """One line: how many blocks, and from which file."""
+        source = f" of '{self.source}'" if self.source else ""
+        return f"<Layout of {mechanics.counted(self.n_blocks, 'block')}{source}>"
+
+    def _miscounted(self, what: str) -> str:
+        return f"{mechanics.counted(self.n_blocks, 'block')} but {what}; give one per block"
 
     @property
     def n_blocks(self) -> int:
@@ -154,8 +168,12 @@ class Layout:
         return np.concatenate(self.every_corner) if self.blocks else np.zeros((0, 2))
 
     def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
-        """Take only these blocks, in this order."""
-        keep = [int(i) for i in blocks]
+        """Take only these blocks, (n,) int in this order or (n_blocks,) bool; ``ValueError`` for others."""
+        try:
+            keep = np.arange(self.n_blocks)[list(blocks)].tolist()
+        except IndexError:
+            last = self.n_blocks - 1
+            raise ValueError(f"there are no blocks {blocks}; give numbers from 0 to {last}, or a bool each") from None
         taken: dict[str, Any] = {}
         for kind in ("blocks", "names", *_UNSAID, "thickness", "density"):
             of = getattr(self, kind)
