@@ -448,7 +448,7 @@ class LimitLoad(HasState, Shown):
 
 
 @dataclass(frozen=True, eq=False)
-class Envelope:
+class Envelope(Shown):
     """Limit loads for several positions of a live load.
 
     Attributes
