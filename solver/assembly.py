@@ -163,8 +163,7 @@ class Assembly(Kept, Shown):
         1.0
         """
         labels = _labels(len(solids), "solids", names, roles, materials) | {"density": density}
-        names = labels["names"]
-        return cls(shapes=polyhedra_of(solids, names), **labels)
+        return cls(shapes=polyhedra_of(solids, labels["names"]), **labels)
 
     def __repr__(self) -> str:
         """One line with the number of blocks by role."""

@@ -503,9 +503,8 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
     of_arms = (*assembly.centroids.shape, assembly.dimension), "arm ⊗ force"
     of_fill = assembly.centroids.shape, "one number per axis, in units of gravity"
     wanted = {"": (shape, components), "_arms": of_arms, "_acceleration": of_fill}
-    wanted = {f"{kind}{of}": values for of, values in wanted.items() for kind in ("dead", "live")}
     arrays: dict[str, Any] = {}
-    for name, (size, words) in wanted.items():
+    for name, (size, words) in ((kind + of, values) for of, values in wanted.items() for kind in ("dead", "live")):
         if (given := getattr(loads, name)) is None and "_" in name:
             continue
         arrays[name] = array = numbers_of(given, f"{name} loads")
@@ -515,4 +514,6 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
         if not (finite := np.isfinite(array.reshape(len(array), -1)).all(axis=1)).all():
             block = int(finite.argmin())
             raise ValueError(f"{name} load on block '{assembly.names[block]}' is {array[block].tolist()}; not finite")
+    for fill in loads.fills:
+        chosen_blocks(assembly, checked(fill, Backfill, "one of the fills").block)
     return replace(loads, **arrays)

@@ -304,8 +304,7 @@ class Structure(Shown):
 
 def _laws(interfaces: Interfaces | None, friction: Any, usual: float | None = None) -> Interfaces:
     """Return the laws of all interfaces, given as such or by a friction coefficient; warns of one that is an angle."""
-    missing = interfaces is None and friction is usual is None
-    if missing or (interfaces is not None and friction != usual):
+    if (interfaces is None and friction is usual is None) or (interfaces is not None and friction != usual):
         raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
     if interfaces is None:
         interfaces = Interfaces(InterfaceLaw(friction))

@@ -13,6 +13,8 @@ ASSEMBLY = solver.Assembly.from_outlines(OUTLINES, names=["brick", "base", "pier
 PUSH = solver.Settlement(direction=(1, 0))
 START = solver.Pose.initial(ASSEMBLY)
 
+WITHOUT_FILL = dataclasses.replace(solver.self_weight(ASSEMBLY), fills=["fill"])
+
 MOTIONS = {
     "translation": {"direction": (3, -4)},
     "rotation": {"rotation_centre": (2, 7), "rotation": -1},
@@ -190,6 +192,10 @@ def test_friction_given_in_degrees_warns():
         ),
         (lambda: solver.Interfaces(pairs={"ab": solver.InterfaceLaw()}), "a law for 'ab'; give it for two materials"),
         (lambda: solver.Interfaces(ground={"g": "x"}), "stiffness of the ground under 'g' is the text 'x'"),
+        (
+            lambda: solver.Structure(ASSEMBLY, friction_coefficient=1, loads=WITHOUT_FILL),
+            "one of the fills is 'fill'; give solver.Backfill",
+        ),
         (lambda: solver.Interfaces(scatter=0.1), r"scatter of interfaces is 0\.1; give solver\.JointScatter"),
         (lambda: solver.settle(ASSEMBLY, None), r"direction is \(None,\); give a sequence of numbers"),
         (
