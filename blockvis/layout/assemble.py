@@ -82,6 +82,7 @@ def assemble(
         For an unknown role, a key of ``roles`` that matches no block, a support without a volume, an overlap deeper
         than the tolerance, and a length that is none.
     """
+    _check_kinds(layout, roles, supports)
     _check_lengths(layout, joint_thickness, overlap_tolerance, closing, outline_tolerance)
     where = layout.source or "layout"
     for note in layout.notes:
@@ -129,6 +130,16 @@ def assemble(
     for note in repairs:
         warnings.warn(f"{where}: {note}", stacklevel=2)
     return solver.Assembly.from_outlines(outlines, **of_blocks)
+
+
+def _check_kinds(layout: Any, roles: Any, supports: Any) -> None:
+    """Refuse what is of another kind than it is to be, by a TypeError."""
+    if not isinstance(layout, Layout):
+        raise TypeError(f"{type(layout).__name__} is no Layout, as read_layout gives; blockvis.read takes a file")
+    if not isinstance(roles, Mapping | None):
+        raise TypeError(f"roles are {roles!r}; give a mapping from names, groups or materials to roles")
+    if isinstance(supports, Mapping):
+        raise TypeError(f"supports are {supports!r}; give a list of them")
 
 
 def _check_lengths(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, cast
 
 import numpy as np
@@ -89,17 +90,7 @@ class Layout:
 
     def __post_init__(self) -> None:
         """Check that there is one of each kind per block, and replace broken characters."""
-        for kind in ("names", *_UNSAID):
-            if kind in _UNSAID and not getattr(self, kind):
-                object.__setattr__(self, kind, (_UNSAID[kind],) * self.n_blocks)
-            if len(getattr(self, kind)) != self.n_blocks:
-                raise ValueError(self._miscounted(f"{len(getattr(self, kind))} {kind}"))
-        for kind in ("density", "thickness"):
-            if (given := getattr(self, kind)) is not None:
-                numbers = np.array(given, dtype=float)
-                if numbers.shape != (self.n_blocks,):
-                    raise ValueError(self._miscounted(f"{kind} of shape {numbers.shape}"))
-                object.__setattr__(self, kind, numbers)
+        self._count()
         for name, role in zip(self.names, self.roles, strict=True):
             if role and role not in mechanics.ROLES:
                 raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(mechanics.ROLES)}")
@@ -117,8 +108,20 @@ class Layout:
         source = f" of '{self.source}'" if self.source else ""
         return f"<Layout of {mechanics.counted(self.n_blocks, 'block')}{source}>"
 
-    def _miscounted(self, what: str) -> str:
-        return f"{mechanics.counted(self.n_blocks, 'block')} but {what}; give one per block"
+    def _count(self) -> None:
+        """Put there what nothing is said of, and refuse what is not one per block."""
+        n, blocks = self.n_blocks, mechanics.counted(self.n_blocks, "block")
+        for kind in ("names", *_UNSAID):
+            given = tuple(getattr(self, kind)) or (_UNSAID.get(kind),) * (n if kind in _UNSAID else 0)
+            if len(given) != n:
+                raise ValueError(f"{blocks} but {len(given)} {kind}; give one per block")
+            object.__setattr__(self, kind, given)
+        for kind in ("density", "thickness"):
+            if getattr(self, kind) is not None:
+                numbers = np.array(getattr(self, kind), dtype=float)
+                if numbers.shape != (n,):
+                    raise ValueError(f"{blocks} but {kind} of shape {numbers.shape}; give one number per block")
+                object.__setattr__(self, kind, numbers)
 
     @property
     def n_blocks(self) -> int:
@@ -236,8 +239,12 @@ def standing(layout: Layout, thickness: float) -> Layout:
 
     Blocks for which the layout has none get the given thickness [m].
     """
+    if not isinstance(thickness, Real):
+        raise ValueError(f"thickness is {thickness!r}; give a length in m above 0")
     depth = np.full(layout.n_blocks, np.nan) if layout.thickness is None else layout.thickness
     depth = np.where(np.isnan(depth), thickness, depth)
+    for k in np.flatnonzero(~((depth > 0.0) & (depth < np.inf))).tolist():
+        raise ValueError(f"block '{layout.names[k]}' has thickness {depth[k]:g} m; give a length above 0")
     return replace(
         layout,
         blocks=tuple(

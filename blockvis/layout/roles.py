@@ -27,8 +27,6 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
 
     Keys that match no block are refused, or left out where some blocks are still to come.
     """
-    if not isinstance(roles, Mapping):
-        raise TypeError(f"roles are {roles!r}; give a mapping from names, groups or materials to roles")
     found = [_drawn_role(layout, i) for i in range(layout.n_blocks)]
     own = mechanics.unique_names(layout.names)
     labels = list(zip(layout.names, layout.groups, layout.materials, strict=True))

@@ -59,7 +59,7 @@ def test_a_layout_is_changed_and_assembled(row):
     for blocks in (kept, kept.tolist(), [0, 2], np.array([0, 2])):
         assert layout.chosen(blocks).names == ("brick 1", "brick 3")
     assert layout.chosen([]).n_blocks == 0
-    changed = replace(layout.chosen(kept), roles=["fixed", "free"], density=[1800, np.nan])
+    changed = replace(layout.chosen(kept), roles=np.array(["fixed", "free"]), density=[1800, np.nan])
     assembly = blockvis.assemble(changed, density=2200.0)
     assert (assembly.density.tolist(), assembly.free.tolist()) == ([1800.0, 2200.0], [False, True])
     assert repr(layout).startswith("<Layout of 3 blocks of '")
@@ -73,10 +73,23 @@ def test_a_layout_is_changed_and_assembled(row):
         (
             lambda layout: replace(layout, density=1800.0),
             ValueError,
-            r"2 blocks but density of shape \(\); give",
+            r"2 blocks but density of shape \(\); give one number per",
         ),
-        (lambda layout: replace(layout, thickness=[1.0]), ValueError, r"2 blocks but thickness of shape \(1,\)"),
+        (
+            lambda layout: replace(layout, thickness=[1.0]),
+            ValueError,
+            r"2 blocks but thickness of shape \(1,\); give one",
+        ),
         (lambda layout: replace(layout, roles=("free", "fred")), ValueError, "block 'brick 2' has role 'fred'"),
+        (lambda layout: blockvis.assemble(layout.source), TypeError, "str is no Layout.*blockvis.read takes a file"),
+        (lambda layout: blockvis.assemble(layout, supports={"name": "g"}), TypeError, "supports are .*; give a list"),
+        (
+            lambda layout: read_layout(layout.source, dimension=3, thickness=-1),
+            ValueError,
+            "has thickness -1 m; give a",
+        ),
+        (lambda layout: read_layout(layout.source, dimension=3, thickness=np.nan), ValueError, "has thickness nan m"),
+        (lambda layout: read_layout(layout.source, dimension=3, thickness="1"), ValueError, "thickness is '1'; give a"),
         (lambda layout: blockvis.assemble(layout, density={"wall": 1}), ValueError, "density is {'wall': 1}; give num"),
         (
             lambda layout: blockvis.assemble(layout, roles=["free"] * 2),
