@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .formats.read import read_layout as read_layout
     from .formats.read import save_layout as save_layout
     from .formats.read import write_layout as write_layout
+    from .layout.assemble import assemble as assemble
     from .pictures.curves import draw_curve as draw_curve
     from .pictures.render import animate as animate
     from .pictures.render import draw_mechanism as draw_mechanism
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from .report.notebook import show as show
     from .report.page import write_report as write_report
     from .runs.reopen import open_results as open_results
+    from .runs.run import resume_run as resume_run
     from .runs.run import run_case as run_case
     from .runs.write import write as write
     from .studies.campaign import study as study
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Case": "cases.contents",
     "animate": "pictures.render",
+    "assemble": "layout.assemble",
     "draw_curve": "pictures.curves",
     "draw_mechanism": "pictures.render",
     "draw_still": "pictures.render",
@@ -51,6 +54,7 @@ _HOMES = {
     "read": "formats.read",
     "read_case": "case_files.read",
     "read_layout": "formats.read",
+    "resume_run": "runs.run",
     "run_case": "runs.run",
     "save_layout": "formats.read",
     "show": "report.notebook",

@@ -128,7 +128,7 @@ class BlockvisAccessor:
         Parameters
         ----------
         roles, supports, density, thickness, joint_thickness, overlap_tolerance
-            As of :func:`blockvis.layout.assemble.assemble`.
+            As of :func:`blockvis.assemble`.
         dimension : {2, 3}, optional
             As of :meth:`layout`.
         """

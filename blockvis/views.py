@@ -25,7 +25,7 @@ class Picture:
 
 
 def shown(value: Any, **options: Any) -> Any:
-    """Show a response in a player, of a limit load, a structure or its blocks a picture."""
+    """Show a response in a player, of limit loads, a structure or its blocks a picture."""
     if isinstance(value, solver.Response):
         from .report.notebook import show
 
@@ -34,13 +34,13 @@ def shown(value: Any, **options: Any) -> Any:
 
 
 def html(value: Any) -> str:
-    """Write a response, a limit load, a collapse, a structure or its blocks as HTML."""
+    """Write a response, limit loads, a collapse, a structure or its blocks as HTML."""
     from .report import notebook
 
     if isinstance(value, solver.LimitLoad):
         return notebook.limit_load_html(value)
-    if isinstance(value, solver.Response):
-        return notebook.response_html(value)
+    if isinstance(value, solver.Response | solver.Envelope):
+        return notebook.response_html(value if isinstance(value, solver.Response) else value.response)
     if isinstance(value, solver.Collapse):
         return notebook.collapse_html(value)
     return notebook.assembly_html(value.assembly if isinstance(value, solver.Structure) else value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,8 @@ FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 class Assembly(Kept, Shown):
     """Rigid blocks of a masonry structure, supports included.
 
-    :meth:`from_outlines` and :meth:`from_solids` check their input. Arrays are only read: for another density take
-    ``dataclasses.replace``.
+    :meth:`from_outlines` and :meth:`from_solids` make one. Arrays are only read: for another density take
+    ``dataclasses.replace``, which checks it.
 
     Attributes
     ----------
@@ -54,6 +55,14 @@ class Assembly(Kept, Shown):
     roles: np.ndarray
     density: np.ndarray
     materials: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Check that each block has a name of its own, a role, a material and a density."""
+        n = len(self.shapes.offsets) - 1
+        labels = _labels(n, "blocks", self.names, list(self.roles), self.materials)
+        labels["drawn_names"] = self.drawn_names
+        vars(self).update(labels, density=_positive(self.density, "density", "kg/m³", labels["names"]))
+        super().__post_init__()
 
     @classmethod
     def from_outlines(
@@ -92,7 +101,7 @@ class Assembly(Kept, Shown):
         >>> float(solver.Assembly.from_outlines([block]).areas[0])
         2.0
         """
-        labels = _labels(len(outlines), "outlines", names, roles, materials)
+        labels = _labels(len(outlines), "outlines", names, roles, materials) | {"density": density}
         names = labels["names"]
         rings = [_checked_ring(outline, name) for outline, name in zip(outlines, names, strict=True)]
         offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
@@ -112,11 +121,7 @@ class Assembly(Kept, Shown):
                 f"block {i} ('{names[i]}') crosses itself or doubles back: the edges that start at ({a[0]:.6g}, "
                 f"{a[1]:.6g}) and ({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
             )
-        return cls(
-            shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)),
-            density=_positive(density, "density", "kg/m³", names),
-            **labels,
-        )
+        return cls(shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)), **labels)
 
     @classmethod
     def from_solids(
@@ -157,9 +162,8 @@ class Assembly(Kept, Shown):
         >>> float(solver.Assembly.from_solids([tetrahedron]).shapes.volumes[0])
         1.0
         """
-        labels = _labels(len(solids), "solids", names, roles, materials)
-        names = labels["names"]
-        return cls(shapes=polyhedra_of(solids, names), density=_positive(density, "density", "kg/m³", names), **labels)
+        labels = _labels(len(solids), "solids", names, roles, materials) | {"density": density}
+        return cls(shapes=polyhedra_of(solids, labels["names"]), **labels)
 
     def __repr__(self) -> str:
         """One line with the number of blocks by role."""
@@ -253,12 +257,20 @@ class Assembly(Kept, Shown):
     def index(self, name: str) -> int:
         """Find the number of the block with this name; raises ``ValueError`` where there is none."""
         if name not in self._numbers:
-            raise ValueError(f"no block is named '{name}'; the assembly has {counted(self.n_blocks, 'block')}")
+            near = "".join(f" (did you mean '{one}'?)" for one in get_close_matches(str(name), self.names, 1))
+            raise ValueError(f"no block is named '{name}'{near}; the assembly has {counted(self.n_blocks, 'block')}")
         return self._numbers[name]
 
     @kept
     def _numbers(self) -> dict[str, int]:
         return {name: k for k, name in enumerate(self.names)}
+
+    def flags(self, given: ArrayLike, what: str) -> np.ndarray:
+        """(n_blocks,) bool array: as given; raises ``ValueError`` for numbers of blocks, or other ones."""
+        flags = np.asarray(given)
+        if flags.shape != (self.n_blocks,) or flags.dtype != bool:
+            raise ValueError(f"{what} is {given!r}; give a bool for each of the {counted(self.n_blocks, 'block')}")
+        return flags
 
     def listed(self, blocks: np.ndarray, most: int) -> str:
         """Names of the first ``most`` blocks, by their numbers, and how many others there are."""
@@ -267,8 +279,7 @@ class Assembly(Kept, Shown):
 
     def with_roles(self, roles: Sequence[str] | np.ndarray) -> Assembly:
         """Give the blocks other roles, (n_blocks,) of "free", "fixed" and "moving"."""
-        labels = _labels(self.n_blocks, "blocks", self.names, list(roles), self.materials)
-        return replace(self, roles=labels["roles"])
+        return replace(self, roles=np.array(list(roles)))
 
 
 def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
@@ -315,9 +326,8 @@ def _labels(
     drawn_names = tuple(f"block {i}" for i in range(n)) if names is None else tuple(map(str, names))
     names = unique_names(drawn_names)
     roles = [FREE] * n if roles is None else list(roles)
-    roles_array = np.array(roles, dtype="<U6")
     materials = ("",) * n if materials is None else tuple(map(str, materials))
-    for kind, given in (("names", len(names)), ("roles", len(roles_array)), ("materials", len(materials))):
+    for kind, given in (("names", len(names)), ("roles", len(roles)), ("materials", len(materials))):
         if given != n:
             raise ValueError(f"{n} {what} but {given} {kind}; give one per block")
     _refuse_half_characters(names, "name")
@@ -325,7 +335,7 @@ def _labels(
     for name, role in zip(names, roles, strict=True):
         if role not in ROLES:
             raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(ROLES)}")
-    return {"names": names, "drawn_names": drawn_names, "roles": roles_array, "materials": materials}
+    return {"names": names, "drawn_names": drawn_names, "roles": np.array(roles, dtype="<U6"), "materials": materials}
 
 
 def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:

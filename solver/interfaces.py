@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -24,14 +23,6 @@ def steep_note(friction: float) -> str:
     angle = f"; if it is an angle in degrees, give its tangent, {math.tan(math.radians(friction)):.3g}"
     slope = math.degrees(math.atan(friction))
     return f"friction_coefficient = {friction:g} is a slope of {slope:.3g} degrees{angle if friction < 90.0 else ''}"
-
-
-def uniform(friction: float) -> Interfaces:
-    """Give every interface the same friction, with a warning where it is probably an angle."""
-    interfaces = Interfaces(InterfaceLaw(friction))
-    if note := steep_note(friction):
-        warnings.warn(note, stacklevel=3)
-    return interfaces
 
 
 @dataclass(frozen=True)
@@ -182,6 +173,8 @@ class Interfaces:
         """Check the laws, the ground, and that no pair has two laws."""
         make_plain(self)
         checked(self.default, InterfaceLaw, "the default law of interfaces")
+        if self.scatter is not None:
+            checked(self.scatter, JointScatter, "the scatter of interfaces")
         for pair, law in self.pairs.items():
             checked(law, InterfaceLaw, f"the law of the interface of {pair}")
             if not isinstance(pair, tuple) or len(pair) != 2:

@@ -69,19 +69,22 @@ class Loads:
 
     def with_forces(self, assembly: Assembly, forces: PointForces, kind: str = "dead") -> Loads:
         """Add forces at points that go with their blocks to the dead or, by ``kind``, the live loads."""
-        if kind not in ("dead", "live"):
-            raise ValueError(f"kind of the forces is {kind!r}; it is 'dead' or 'live'")
-        arms = added(getattr(self, f"{kind}_arms"), forces.arms(assembly))
-        return replace(self, **{kind: getattr(self, kind) + forces.load(assembly), f"{kind}_arms": arms})
+        load = checked(forces, PointForces, "forces").load(assembly)
+        return self._plus(kind, load, "arms", forces.arms(assembly))
 
     def with_acceleration(
         self, assembly: Assembly, fraction: Sequence[float], kind: str = "live", blocks: ArrayLike | None = None
     ) -> Loads:
         """Add :func:`weight_fraction` of the blocks, and of the fill over them, to the dead or live loads."""
-        load, name = weight_fraction(assembly, fraction, blocks), f"{kind}_acceleration"
-        of_fill = np.zeros_like(assembly.centroids)
-        of_fill[slice(None) if blocks is None else chosen_blocks(assembly, blocks)] = fraction
-        return replace(self, **{kind: getattr(self, kind) + load, name: added(getattr(self, name), of_fill)})
+        load, of_fill = weight_fraction(assembly, fraction, blocks), np.zeros_like(assembly.centroids)
+        of_fill[chosen_blocks(assembly, blocks)] = fraction
+        return self._plus(kind, load, "acceleration", of_fill)
+
+    def _plus(self, kind: str, load: np.ndarray, beside: str, more: np.ndarray) -> Loads:
+        if kind not in ("dead", "live"):
+            raise ValueError(f"kind of the load is {kind!r}; it is 'dead' or 'live'")
+        name = f"{kind}_{beside}"
+        return replace(self, **{kind: getattr(self, kind) + load, name: added(getattr(self, name), more)})
 
     def note_on_mass(self, assembly: Assembly) -> str:
         """Say how large dead loads are, downwards, on blocks whose only live load is an acceleration; else nothing."""
@@ -149,8 +152,8 @@ class PointForces(Kept):
         load, d = _no_load(assembly), assembly.dimension
         chosen_blocks(assembly, self.block)
         for name, given in (("force", self.force), ("point", self.point)):
-            if given.shape[1:] != (d,):
-                raise ValueError(f"a {name} is {given[0].tolist()}; give {d} numbers, one per axis")
+            if given.shape != (self.block.size, d):
+                raise ValueError(f"a {name} is {np.squeeze(given).tolist()}; give {d} numbers per block, one per axis")
         arms = cross_rows(self.point - assembly.centroids[self.block])
         np.add.at(load, self.block, np.hstack([self.force, np.einsum("nrd,nd->nr", arms, self.force)]))
         return load
@@ -419,7 +422,7 @@ def _no_load(assembly: Assembly) -> np.ndarray:
 
 
 def chosen_blocks(assembly: Assembly, blocks: Any) -> np.ndarray:
-    """(n_blocks,) bool array: blocks that are given by their numbers, or as such an array."""
+    """(n_blocks,) bool array: blocks that are given by their numbers, or as such an array; all by None."""
     chosen = np.zeros(assembly.n_blocks, dtype=bool)
     try:
         chosen[list(blocks) if isinstance(blocks, tuple) else blocks] = True
@@ -448,10 +451,9 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: Array
         Of the blocks; fill over them has its part by :meth:`Loads.with_acceleration`.
     """
     load, parts, d = _no_load(assembly), numbers_of(fraction, "a fraction of the weight"), assembly.dimension
-    chosen = slice(None) if blocks is None else chosen_blocks(assembly, blocks)
     if parts.shape != (d,):
         raise ValueError(f"a fraction of the weight is {parts.tolist()}; give {d} numbers, one per axis")
-    load[chosen, :d] = (assembly.masses * GRAVITY)[chosen, None] * parts
+    load[:, :d] = (assembly.masses * GRAVITY * chosen_blocks(assembly, blocks))[:, None] * parts
     return load
 
 
@@ -501,9 +503,8 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
     of_arms = (*assembly.centroids.shape, assembly.dimension), "arm ⊗ force"
     of_fill = assembly.centroids.shape, "one number per axis, in units of gravity"
     wanted = {"": (shape, components), "_arms": of_arms, "_acceleration": of_fill}
-    wanted = {f"{kind}{of}": values for of, values in wanted.items() for kind in ("dead", "live")}
     arrays: dict[str, Any] = {}
-    for name, (size, words) in wanted.items():
+    for name, (size, words) in ((kind + of, values) for of, values in wanted.items() for kind in ("dead", "live")):
         if (given := getattr(loads, name)) is None and "_" in name:
             continue
         arrays[name] = array = numbers_of(given, f"{name} loads")
@@ -513,4 +514,6 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
         if not (finite := np.isfinite(array.reshape(len(array), -1)).all(axis=1)).all():
             block = int(finite.argmin())
             raise ValueError(f"{name} load on block '{assembly.names[block]}' is {array[block].tolist()}; not finite")
+    for fill in loads.fills:
+        chosen_blocks(assembly, checked(fill, Backfill, "one of the fills").block)
     return replace(loads, **arrays)

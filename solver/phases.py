@@ -42,10 +42,11 @@ class PhaseChange:
     def __post_init__(self) -> None:
         """Make arrays of its own of what is given: the caller may fill theirs again."""
         object.__setattr__(self, "ties", plain(self.ties, "Sequence[str]", "ties of a change"))
-        kinds = {"removed": bool, "dead": float, "dead_arms": float, "dead_acceleration": float}
-        for name, kind in kinds.items():
+        if self.removed is not None:
+            object.__setattr__(self, "removed", np.array(self.removed))
+        for name in ("dead", "dead_arms", "dead_acceleration"):
             if (given := getattr(self, name)) is not None:
-                object.__setattr__(self, name, numbers_of(given, f"{name} of a change").astype(kind))
+                object.__setattr__(self, name, numbers_of(given, f"{name} of a change"))
 
 
 def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) -> np.ndarray:

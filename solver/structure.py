@@ -16,7 +16,7 @@ from .analysis.limit_load import find_limit_load
 from .analysis.pushover import pushover_increments
 from .analysis.settlement import settlement_increments
 from .assembly import Assembly
-from .interfaces import InterfaceLaw, Interfaces, uniform
+from .interfaces import InterfaceLaw, Interfaces, steep_note
 from .kinematics import Pose
 from .loads import Loads, PointForces, Settlement, checked_loads
 from .path.controls import Controls
@@ -27,6 +27,9 @@ from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, reaction_
 from .results.response import Envelope, LimitLoad, Response
 from .ties import Tie, TieForces
 from .views import Shown
+
+#: Friction coefficient of joints of which nothing is said.
+USUAL = InterfaceLaw.friction_coefficient
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -67,14 +70,7 @@ class Structure(Shown):
         friction_coefficient: float | None = None,
         ties: Sequence[Tie] = (),
     ) -> None:
-        if (interfaces is None) == (friction_coefficient is None):
-            raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
-        if friction_coefficient is not None:
-            interfaces = uniform(friction_coefficient)
-        if not isinstance(interfaces, Interfaces):
-            raise TypeError(
-                f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name"
-            )
+        interfaces = _laws(interfaces, friction_coefficient)
         interfaces.check(checked(assembly, Assembly, "assembly"))
         loads, ties = checked_loads(assembly, loads), tuple(checked(tie, Tie, "one of the ties") for tie in ties)
         vars(self).update(assembly=assembly, interfaces=interfaces, loads=loads, ties=ties)
@@ -162,7 +158,8 @@ class Structure(Shown):
     ) -> Response:
         """Follow the structure under growing displacement from its limit load down to where it carries none.
 
-        Fixed and moving supports both stand still.
+        Fixed and moving supports both stand still. The path is that of a settlement, with the multiplier as one more
+        unknown and the control displacement as one more equation.
 
         Parameters
         ----------
@@ -188,11 +185,6 @@ class Structure(Shown):
         ------
         ValueError
             For input that cannot be analysed: no live load, a control block that is a support, overlapping blocks.
-
-        Notes
-        -----
-        The path is that of a settlement, see :mod:`solver.path.path`, with the multiplier as one more unknown and the
-        control displacement as one more equation.
         """
         given = vars(self) | _standing(pose, ties_at, bonds_at, fallen)
         increments = pushover_increments(control=control, controls=controls, **given)
@@ -310,6 +302,19 @@ class Structure(Shown):
         return Response(increments=found, **vars(self), **vars(increments.ending), **analysed)
 
 
+def _laws(interfaces: Interfaces | None, friction: Any, usual: float | None = None) -> Interfaces:
+    """Return the laws of all interfaces, given as such or by a friction coefficient; warns of one that is an angle."""
+    if (interfaces is None and friction is usual is None) or (interfaces is not None and friction != usual):
+        raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
+    if interfaces is None:
+        interfaces = Interfaces(InterfaceLaw(friction))
+        if note := steep_note(interfaces.default.friction_coefficient):
+            warnings.warn(note, stacklevel=3)
+    if not isinstance(interfaces, Interfaces):
+        raise TypeError(f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name")
+    return interfaces
+
+
 def _standing(
     pose: Pose | None, ties_at: TieForces | None, bonds_at: Bonds | None, fallen: np.ndarray | None
 ) -> dict[str, Any]:
@@ -320,30 +325,26 @@ def _standing(
 
 
 def _phases(settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray) -> tuple[Settlement, ...]:
-    if isinstance(settlement, Settlement):
-        return (settlement,)
-    direction = [part for part in settlement if not isinstance(part, Settlement)]
-    if len(direction) == len(settlement) > 0:
-        return (Settlement(direction=direction),)
-    return tuple(checked(part, Settlement, "one of the settlements") for part in settlement)
+    parts: Any = settlement if isinstance(settlement, Sequence | np.ndarray) else (settlement,)
+    if len(parts) and not any(isinstance(part, Settlement) for part in parts):
+        return (Settlement(direction=parts),)
+    return tuple(checked(part, Settlement, "one of the settlements") for part in parts)
 
 
 def settle(
     assembly: Assembly,
     settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray,
     *,
-    friction_coefficient: float = InterfaceLaw.friction_coefficient,
+    friction_coefficient: float = USUAL,
     interfaces: Interfaces | None = None,
     loads: Loads | None = None,
-    controls: Controls | None = None,
-    on_increment: Callable[[Increment], None] | None = None,
+    **options: Any,
 ) -> Response:
-    """Follow blocks through the settlement of their supports to collapse: :meth:`Structure.settle` in one call.
+    """Follow blocks through a settlement to collapse: :meth:`Structure.settle`, with its options, in one call.
 
-    The friction coefficient is of every interface, where ``interfaces`` are not given.
+    The friction coefficient is of every interface; another than 0.6 beside ``interfaces`` is refused.
     """
-    structure = Structure(assembly, interfaces or uniform(friction_coefficient), loads)
-    return structure.settle(settlement, controls=controls, on_increment=on_increment)
+    return Structure(assembly, _laws(interfaces, friction_coefficient, USUAL), loads).settle(settlement, **options)
 
 
 def pushover(
@@ -351,21 +352,21 @@ def pushover(
     control: ControlDisplacement,
     *,
     loads: Loads | None = None,
-    friction_coefficient: float = InterfaceLaw.friction_coefficient,
+    friction_coefficient: float = USUAL,
     interfaces: Interfaces | None = None,
     **options: Any,
 ) -> Response:
     """Follow blocks under growing displacement: :meth:`Structure.pushover`, with its options, in one call."""
-    return Structure(assembly, interfaces or uniform(friction_coefficient), loads).pushover(control, **options)
+    return Structure(assembly, _laws(interfaces, friction_coefficient, USUAL), loads).pushover(control, **options)
 
 
 def limit_load(
     assembly: Assembly,
     *,
     loads: Loads | None = None,
-    friction_coefficient: float = InterfaceLaw.friction_coefficient,
+    friction_coefficient: float = USUAL,
     interfaces: Interfaces | None = None,
     **options: Any,
 ) -> LimitLoad:
     """Find the largest multiplier of live loads: :meth:`Structure.limit_load`, with its options, in one call."""
-    return Structure(assembly, interfaces or uniform(friction_coefficient), loads).limit_load(**options)
+    return Structure(assembly, _laws(interfaces, friction_coefficient, USUAL), loads).limit_load(**options)

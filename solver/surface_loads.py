@@ -36,7 +36,7 @@ def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) ->
 def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> PointForces:
     """Find the resultant of a uniform pressure on an edge, which keeps its direction; as :func:`edge_pressure`."""
     chosen_blocks(assembly, block)
-    ring = assembly.outline(block)
+    ring, edge = assembly.outline(block), plain(edge, "int", "edge")
     if not 0 <= edge < len(ring):
         raise ValueError(f"block '{assembly.names[block]}' has {len(ring)} edges; edge {edge} is none of them")
     start, stop = ring[edge], ring[(edge + 1) % len(ring)]

@@ -6,6 +6,7 @@ import operator
 from collections.abc import Callable
 from dataclasses import fields
 from functools import cached_property, wraps
+from reprlib import repr as shortened
 from typing import Any, TypeVar
 
 import numpy as np
@@ -55,7 +56,7 @@ def plain(value: Any, kind: str, what: str) -> Any:
 def checked(value: Any, kind: type[T], what: str) -> T:
     """Return a value of this type; raises ``TypeError`` that says what another was to be."""
     if not isinstance(value, kind):
-        raise TypeError(f"{what} is {value!r}; give solver.{kind.__name__}")
+        raise TypeError(f"{what} is {shortened(value)}; give solver.{kind.__name__}")
     return value
 
 
@@ -66,7 +67,7 @@ def numbers_of(value: Any, what: str) -> np.ndarray:
             raise TypeError
         return np.array(np.ma.filled(value, np.nan), dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{what} is {value!r}; give numbers, as many in each row") from None
+        raise ValueError(f"{what} is {shortened(value)}; give numbers, as many in each row") from None
 
 
 def read_only(value: T) -> T:

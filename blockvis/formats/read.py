@@ -99,8 +99,10 @@ def read_layout(
     Returns
     -------
     Layout
-        Lengths in m, outlines without collinear points, plane faces. What the drawing holds beside its blocks is in
-        ``left_out``, and in a note per kind and layer.
+        Its ``blocks``, ``names``, ``groups``, ``roles``, ``materials``, ``density`` and ``thickness`` have one of each
+        per block; ``dataclasses.replace`` changes them, ``chosen`` takes some of the blocks, and
+        :func:`blockvis.assemble` makes an assembly of what comes out. Lengths in m, outlines without collinear points,
+        plane faces. What the drawing holds beside its blocks is in ``left_out``, and in a note per kind and layer.
 
     Raises
     ------
@@ -322,7 +324,7 @@ def read(
     ----------
     path : str or Path
     roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing
-        As of :func:`blockvis.layout.assemble.assemble`, as is ``outline_tolerance``.
+        As of :func:`blockvis.assemble`, as is ``outline_tolerance``.
     unit, chord_tolerance, view, ignore, only, window, dimension, **image
         As of :func:`read_layout`.
     """

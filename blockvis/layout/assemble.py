@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import solver
 from blockvis.text import beginning, nearest
@@ -45,10 +46,7 @@ def assemble(
     closing: str = "auto",
     outline_tolerance: float | None = None,
 ) -> solver.Assembly:
-    """Make an assembly of a layout.
-
-    ValueError for an unknown role, a key of ``roles`` that matches no block, a support without a volume, an overlap
-    deeper than the tolerance, and a length that is none.
+    """Make an assembly of a layout, as :func:`blockvis.read_layout` or :func:`blockvis.generators.bond` give one.
 
     Parameters
     ----------
@@ -61,10 +59,10 @@ def assemble(
         Support blocks that the file does not contain: ``name``, ``role`` and ``outline`` [m] of each, perhaps
         ``density``, ``thickness`` and ``material``. In space the outline lies in plan, and ``levels``, [bottom, top]
         [m], take the place of the thickness.
-    density : float [kg/m³]
-        Of blocks for which the layout has none.
-    thickness : float [m]
-        Of blocks for which the layout has none.
+    density : float or (n_blocks,) array [kg/m³]
+        Of blocks for which the layout has none; of several with ``supports`` last.
+    thickness : float or (n_blocks,) array [m]
+        Likewise.
     joint_thickness : float [m] or "auto"
         Gaps between facing edges, or faces, up to this width are closed to their midline.
     overlap_tolerance : float, optional [m]
@@ -77,7 +75,14 @@ def assemble(
     outline_tolerance : float, optional [m]
         Corners within this distance of a simpler outline are dropped; by default a hundredth of the size of a block
         where outlines have more than 24 corners in the mean, else 0.
+
+    Raises
+    ------
+    ValueError
+        For an unknown role, a key of ``roles`` that matches no block, a support without a volume, an overlap deeper
+        than the tolerance, and a length that is none.
     """
+    _check_kinds(layout, roles, supports)
     _check_lengths(layout, joint_thickness, overlap_tolerance, closing, outline_tolerance)
     where = layout.source or "layout"
     for note in layout.notes:
@@ -99,7 +104,7 @@ def assemble(
     of_blocks: dict[str, Any] = {
         "names": layout.names,
         "roles": roles_of(layout, roles or {}),
-        "density": _filled(layout.density, density, layout.n_blocks),
+        "density": _filled(layout.density, density),
         "materials": layout.materials,
     }
     if layout.dimension == 3:
@@ -112,7 +117,7 @@ def assemble(
             if note:
                 warnings.warn(f"{where}: {note}", stacklevel=2)
         return assembly
-    of_blocks["thickness"] = _filled(layout.thickness, thickness, layout.n_blocks)
+    of_blocks["thickness"] = _filled(layout.thickness, thickness)
     outlines, repairs = repaired(
         solver.Assembly.from_outlines(layout.outlines, **of_blocks),
         joint_thickness=joint_thickness,
@@ -125,6 +130,16 @@ def assemble(
     for note in repairs:
         warnings.warn(f"{where}: {note}", stacklevel=2)
     return solver.Assembly.from_outlines(outlines, **of_blocks)
+
+
+def _check_kinds(layout: Any, roles: Any, supports: Any) -> None:
+    """Refuse what is of another kind than it is to be, by a TypeError."""
+    if not isinstance(layout, Layout):
+        raise TypeError(f"{type(layout).__name__} is no Layout, as read_layout gives; blockvis.read takes a file")
+    if not isinstance(roles, Mapping | None):
+        raise TypeError(f"roles are {roles!r}; give a mapping from names, groups or materials to roles")
+    if isinstance(supports, Mapping):
+        raise TypeError(f"supports are {supports!r}; give a list of them")
 
 
 def _check_lengths(
@@ -200,10 +215,8 @@ def as_simplified(layout: Layout, tolerance: float | None = None) -> tuple[Layou
     return replace(layout, blocks=tuple(outlines)), note
 
 
-def _filled(given: np.ndarray | None, default: float, n: int) -> np.ndarray:
-    if given is None:
-        return np.full(n, float(default))
-    return np.where(np.isnan(given), float(default), given)
+def _filled(given: np.ndarray | None, default: ArrayLike) -> ArrayLike:
+    return default if given is None else np.where(np.isnan(given), default, given)
 
 
 def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout:

@@ -51,17 +51,14 @@ def with_rows(layout: Layout, rows: Sequence[Any], *, own: bool = False) -> Layo
             return None
         return np.array([_number(row.get(key, math.nan), key, name) for name, row in zip(names, entries, strict=True)])
 
-    names, roles = words("name", layout.names), words("role", [""] * layout.n_blocks)
-    for name, role in zip(names, roles, strict=True):
-        if role and role not in mechanics.ROLES:
-            raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(mechanics.ROLES)}")
+    names = words("name", layout.names)
     return replace(
         layout,
         thickness=numbers("thickness") if layout.dimension == 2 else None,
         thickness_unit="m" if own else layout.thickness_unit,
         names=names,
         groups=words("group", [""] * layout.n_blocks),
-        roles=roles,
+        roles=words("role", [""] * layout.n_blocks),
         materials=words("material", [""] * layout.n_blocks),
         density=numbers("density"),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, cast
 
 import numpy as np
@@ -89,22 +90,38 @@ class Layout:
 
     def __post_init__(self) -> None:
         """Check that there is one of each kind per block, and replace broken characters."""
-        for kind in ("names", *_UNSAID):
-            if kind in _UNSAID and not getattr(self, kind):
-                object.__setattr__(self, kind, (_UNSAID[kind],) * self.n_blocks)
-            if len(getattr(self, kind)) != self.n_blocks:
-                raise ValueError(
-                    f"{mechanics.counted(self.n_blocks, 'block')} but {len(getattr(self, kind))} {kind}; "
-                    "give one per block"
-                )
+        self._count()
+        for name, role in zip(self.names, self.roles, strict=True):
+            if role and role not in mechanics.ROLES:
+                raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(mechanics.ROLES)}")
         # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
         note = "characters that the file's encoding does not have are shown as \ufffd"
         for kind in ("names", "groups", "roles", "materials"):
-            words = getattr(self, kind)
+            words = tuple(map(str, getattr(self, kind)))
             whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
-            if whole != tuple(words) and note not in self.notes:
+            if whole != words and note not in self.notes:
                 object.__setattr__(self, "notes", (*self.notes, note))
             object.__setattr__(self, kind, whole)
+
+    def __repr__(self) -> str:
+        """One line: how many blocks, and from which file."""
+        source = f" of '{self.source}'" if self.source else ""
+        return f"<Layout of {mechanics.counted(self.n_blocks, 'block')}{source}>"
+
+    def _count(self) -> None:
+        """Put there what nothing is said of, and refuse what is not one per block."""
+        n, blocks = self.n_blocks, mechanics.counted(self.n_blocks, "block")
+        for kind in ("names", *_UNSAID):
+            given = tuple(getattr(self, kind)) or (_UNSAID.get(kind),) * (n if kind in _UNSAID else 0)
+            if len(given) != n:
+                raise ValueError(f"{blocks} but {len(given)} {kind}; give one per block")
+            object.__setattr__(self, kind, given)
+        for kind in ("density", "thickness"):
+            if getattr(self, kind) is not None:
+                numbers = np.array(getattr(self, kind), dtype=float)
+                if numbers.shape != (n,):
+                    raise ValueError(f"{blocks} but {kind} of shape {numbers.shape}; give one number per block")
+                object.__setattr__(self, kind, numbers)
 
     @property
     def n_blocks(self) -> int:
@@ -154,8 +171,12 @@ class Layout:
         return np.concatenate(self.every_corner) if self.blocks else np.zeros((0, 2))
 
     def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
-        """Take only these blocks, in this order."""
-        keep = [int(i) for i in blocks]
+        """Take only these blocks, (n,) int in this order or (n_blocks,) bool; ``ValueError`` for others."""
+        try:
+            keep = np.arange(self.n_blocks)[list(blocks)].tolist()
+        except IndexError:
+            last = self.n_blocks - 1
+            raise ValueError(f"there are no blocks {blocks}; give numbers from 0 to {last}, or a bool each") from None
         taken: dict[str, Any] = {}
         for kind in ("blocks", "names", *_UNSAID, "thickness", "density"):
             of = getattr(self, kind)
@@ -218,8 +239,12 @@ def standing(layout: Layout, thickness: float) -> Layout:
 
     Blocks for which the layout has none get the given thickness [m].
     """
+    if not isinstance(thickness, Real):
+        raise ValueError(f"thickness is {thickness!r}; give a length in m above 0")
     depth = np.full(layout.n_blocks, np.nan) if layout.thickness is None else layout.thickness
     depth = np.where(np.isnan(depth), thickness, depth)
+    for k in np.flatnonzero(~((depth > 0.0) & (depth < np.inf))).tolist():
+        raise ValueError(f"block '{layout.names[k]}' has thickness {depth[k]:g} m; give a length above 0")
     return replace(
         layout,
         blocks=tuple(

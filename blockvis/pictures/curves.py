@@ -17,6 +17,7 @@ from PIL import Image, ImageDraw
 
 import solver
 from blockvis.results.about import (
+    Result,
     about,
     after_settlements,
     collapse_phase,
@@ -24,6 +25,7 @@ from blockvis.results.about import (
     in_phase,
     losing,
     phases_of,
+    response_of,
 )
 from blockvis.results.mechanism_arrays import SWING
 from blockvis.results.reaction_range import ReactionRange
@@ -67,7 +69,7 @@ PATCH = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
 
 @plain_text
 def draw_curve(
-    response: solver.Response | solver.LimitLoad | solver.Envelope,
+    response: Result,
     path: str | os.PathLike[str],
     *,
     size: tuple[float, float] = (8.0, 5.0),
@@ -88,7 +90,7 @@ def draw_curve(
     band : ReactionRange, optional
         Of the reaction, drawn behind it.
     """
-    response = response if isinstance(response, solver.Response) else response.response
+    response = response_of(response)
     path, name = Path(path), "   ·   ".join(filter(None, (about(response).name, after_settlements(response))))
     if in_one_unit(response) is not response:
         response = in_one_unit(response)

@@ -12,7 +12,7 @@ from PIL import Image
 import solver
 from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.layout.sights import Cut, Sight, read_cut, read_sight
-from blockvis.results.about import collapse_phase, loss_of
+from blockvis.results.about import Result, collapse_phase, loss_of, response_of
 from blockvis.results.increments import numbered
 from blockvis.results.tables import change_words
 from blockvis.system.atomic_files import atomic_file
@@ -29,7 +29,7 @@ from .video import FASTEST_GIF, write_film
 
 
 def draw_still(
-    response: solver.Response,
+    response: Result,
     increment: int | solver.Increment,
     path: str | os.PathLike[str],
     *,
@@ -47,7 +47,7 @@ def draw_still(
 
     Parameters
     ----------
-    response : solver.Response
+    response : solver.Response, solver.LimitLoad or solver.Envelope
     increment : int or solver.Increment
         An increment of the response, or its number; -1 is the last, of what collapses a frame of its fall.
     path : path
@@ -80,7 +80,7 @@ def draw_still(
         For a number that no increment has, a view or a section of blocks in the plane, and a plane that misses the
         blocks.
     """
-    check_increments(response)
+    response = to_show(response)
     chosen = increment if isinstance(increment, solver.Increment) else numbered(response.increments, increment)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     drawer = Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay, still=True)
@@ -97,7 +97,7 @@ def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:
 
 
 def draw_mechanism(
-    response: solver.Response | solver.LimitLoad | solver.Envelope,
+    response: Result,
     path: str | os.PathLike[str],
     *,
     size: tuple[int, int] | None = None,
@@ -120,7 +120,7 @@ def draw_mechanism(
 
 
 def mechanism_picture(
-    response: solver.Response | solver.LimitLoad | solver.Envelope,
+    response: Result,
     size: tuple[int, int] | None = None,
     *,
     usual: tuple[int, int] = STILL_SIZE,
@@ -129,8 +129,7 @@ def mechanism_picture(
     section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Image.Image:
     """Make the picture of :func:`draw_mechanism`; without a size it has as many pixels as is ``usual``."""
-    response = response if isinstance(response, solver.Response) else response.response
-    check_increments(response)
+    response = to_show(response)
     swing = swing_of(response)
     sight, cut = seen_from(view, section)
     look, extra = Look(forces="none", sight=sight, cut=cut), (swing.displaced,)
@@ -144,7 +143,7 @@ def mechanism_picture(
 
 
 def animate(
-    response: solver.Response,
+    response: Result,
     path: str | os.PathLike[str],
     *,
     size: tuple[int, int] | None = None,
@@ -170,7 +169,7 @@ def animate(
 
     Parameters
     ----------
-    response : solver.Response
+    response : solver.Response, solver.LimitLoad or solver.Envelope
     path : path
         Ending in .mp4, .gif or .webp; a name without an ending is a folder of pictures.
     size : (int, int), optional
@@ -190,7 +189,7 @@ def animate(
     poster : path, optional
         Of a picture that stands for the film where it does not play: the frame in which the fall is fastest.
     """
-    check_increments(response)
+    response = to_show(response)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     if magnification != 1.0:
         fall = None
@@ -238,10 +237,12 @@ def _digits(bracket: tuple[float, float]) -> int:
     return next((n for n in range(5, 9) if f"{bracket[0]:.{n}g}" != f"{bracket[1]:.{n}g}"), 9)
 
 
-def check_increments(response: solver.Response) -> None:
-    """Raise ``ValueError`` for a response without an increment, which no picture or page can show."""
+def to_show(result: Result) -> solver.Response:
+    """Take a result as a response; raises ``ValueError`` for one without an increment, which nothing can show."""
+    response = response_of(result)
     if not response.increments:
         raise ValueError(f"there is no increment to show: {response.message or response.stop}")
+    return response
 
 
 def save_picture(picture: Image.Image, path: str | os.PathLike[str]) -> Path:

@@ -18,6 +18,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.frame import FILM_SIZE
 from blockvis.pictures.render import mechanism_picture, save_picture
+from blockvis.results.about import Result, response_of
 from blockvis.results.fall_files import known_fall
 from blockvis.text import force_text
 from solver import mechanics
@@ -42,16 +43,16 @@ class Player:
         return f'<iframe srcdoc="{page}" style="{style}" sandbox="allow-scripts allow-downloads"></iframe>'
 
 
-def show(response: solver.Response, *, height: int = 760) -> Player:
+def show(response: Result, *, height: int = 760) -> Player:
     """Show a response in a player, for the last line of a notebook cell.
 
     Parameters
     ----------
-    response : solver.Response
+    response : solver.Response, solver.LimitLoad or solver.Envelope
     height : int
         Pixels.
     """
-    return Player(response, height)
+    return Player(response_of(response), height)
 
 
 def response_html(response: solver.Response) -> str:
@@ -63,8 +64,7 @@ def response_html(response: solver.Response) -> str:
             pictures.append(save_picture(picture, Path(folder) / "mechanism.png"))
         if response.path:
             pictures.append(draw_curve(response, Path(folder) / "curve.png", size=(6.4, 3.6)))
-        # At half their width.
-        images = [_image(path.stem, Image.open(path).width // 2, path.read_bytes()) for path in pictures]
+        images = [_image(path.stem, path.read_bytes()) for path in pictures]
     return f"<div>{''.join(images)}{_table(summary_rows(response))}</div>"
 
 
@@ -116,10 +116,12 @@ def _drawn_in_space(assembly: solver.Assembly) -> str:
 
     buffer = io.BytesIO()
     blocks_picture(assembly, (2 * WIDE, 2 * HIGH), palette.role_colours(assembly)).save(buffer, "PNG")
-    return _image("blocks", WIDE, buffer.getvalue())
+    return _image("blocks", buffer.getvalue())
 
 
-def _image(alt: str, width: int, png: bytes) -> str:
+def _image(alt: str, png: bytes) -> str:
+    """Show a picture at half its width."""
+    width = Image.open(io.BytesIO(png)).width // 2
     return f'<img alt="{alt}" width="{width}" src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}">'
 
 

@@ -44,10 +44,10 @@ from blockvis.pictures.captions import (
 from blockvis.pictures.drawer import FEW_BLOCKS
 from blockvis.pictures.film import PATH_SECONDS
 from blockvis.pictures.marks import STEEPEST, WIDEST
-from blockvis.pictures.render import check_increments
+from blockvis.pictures.render import to_show
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
-from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of, phases_of
+from blockvis.results.about import Result, about, certified, counts_text, governing_limit, loss_of, phases_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, last_cracks
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
@@ -95,7 +95,7 @@ class _Frame:
 
 
 def write_report(
-    response: solver.Response,
+    response: Result,
     path: str | os.PathLike[str],
     case_text: str = "",
     *,
@@ -108,7 +108,7 @@ def write_report(
 
     Parameters
     ----------
-    response : solver.Response
+    response : solver.Response, solver.LimitLoad or solver.Envelope
     path : path
     case_text : str
         The case file, shown as it is.
@@ -150,7 +150,7 @@ def range_rows(band: ReactionRange | None) -> list[tuple[str, str]]:
 
 
 def report_html(
-    response: solver.Response,
+    response: Result,
     case_text: str = "",
     *,
     title: str = "",
@@ -163,7 +163,7 @@ def report_html(
     Everything that comes from a file (names, materials, the case) is escaped or goes through ``textContent``; the page
     forbids itself any request.
     """
-    check_increments(response)
+    response = to_show(response)
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
     origin = about(response)
     model = _model(response, fall, band) | {"name": origin.name}

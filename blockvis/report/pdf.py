@@ -22,7 +22,7 @@ from blockvis.pictures.captions import failure_text, in_one_unit, losses_along, 
 from blockvis.pictures.crack_drawing import draw_cracks
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.marks import evenly
-from blockvis.pictures.render import check_increments, draw_mechanism, draw_still
+from blockvis.pictures.render import draw_mechanism, draw_still, to_show
 from blockvis.pictures.underlay import Underlay
 from blockvis.results.about import about, phases_of
 from blockvis.results.cracks import Crack, last_cracks
@@ -63,7 +63,7 @@ def write_pdf(
     Underlay, view and section are as of :func:`blockvis.draw_still`, all else as of :func:`blockvis.write_report`.
     Raises ``ValueError`` if there is no increment to show.
     """
-    check_increments(response)
+    response = to_show(response)
     eye = {"view": view, "section": section}
     origin = about(response)
     paper = _Paper(f"{origin.name} · {origin.version}".strip(" ·"))

@@ -38,6 +38,19 @@ class About:
     version: str  #: Of this program, when the run began.
 
 
+#: What pictures, pages and folders are made of.
+Result = solver.Response | solver.LimitLoad | solver.Envelope
+
+
+def response_of(result: Result) -> solver.Response:
+    """Take limit loads as an analysis of their own; raises ``TypeError`` for what is no result."""
+    if isinstance(result, solver.LimitLoad | solver.Envelope):
+        return result.response
+    if not isinstance(result, solver.Response):
+        raise TypeError(f"{type(result).__name__} is no response; give what settle, pushover or limit_load returns")
+    return result
+
+
 def governing_limit(response: solver.Response) -> solver.LimitLoad | None:
     """Find the limit load of the increment that decides; none where that is no limit state."""
     return next((limit for limit, state in response.limit_states if state is response.governing), None)

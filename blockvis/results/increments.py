@@ -116,7 +116,7 @@ def numbered(increments: Sequence[solver.Increment], k: int) -> solver.Increment
     """Choose an increment by its number, below 0 from the end; raises ``ValueError`` where there is none."""
     n = len(increments)
     if not isinstance(k, (int, np.integer)):
-        raise TypeError(f"k is {k!r}; it is the number of an increment, 0 to {n - 1}, or -1 for the last")
+        raise TypeError(f"the increment is {k!r}; give its number, 0 to {n - 1}, or -1 for the last")
     if not -n <= k < n:
         raise ValueError(f"there is no increment {k}; the response has {n}, 0 to {n - 1}, or -1 for the last")
     return increments[k]

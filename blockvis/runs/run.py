@@ -103,7 +103,7 @@ def run_case(
     film, pictures : bool
         Draw the film of the case; draw anything at all, the report included.
     outputs : sequence of Drawing, optional
-        What is made beside the numbers, in place of what ``film`` and ``pictures`` say.
+        What is made beside the numbers, in place of what ``film`` and ``pictures`` say: () for the numbers alone.
     increment_seconds : float, optional [s]
         What an increment may take, in place of what the case says.
 
@@ -111,7 +111,7 @@ def run_case(
     -------
     Run
         Also after an interruption by Ctrl-C, or by an increment that takes longer than it may: what was finished is
-        written, with status "interrupted".
+        written, with status "interrupted", and :func:`resume_run` goes on.
 
     Raises
     ------
@@ -153,13 +153,26 @@ def resume_run(
 ) -> Run:
     """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 
-    The outputs are as in :func:`run_case`; an increment may take so many seconds, by default what it takes, whatever
-    the case says. Raises ``ValueError`` if the folder holds no run, or one that was made from Python and cannot be
-    followed again.
-
     A settlement and a pushover go on from their last equilibrium, limit loads behind the last that was found; a
     settlement that comes before them and had not ended starts again. Files of the case that have changed are named in a
     warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
+
+    Parameters
+    ----------
+    folder : str or Path
+    outputs : sequence of Drawing, optional
+        As in :func:`run_case`; everything by default.
+    increment_seconds : float, optional [s]
+        What an increment may take, by default what it takes, whatever the case says.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    ValueError
+        If the folder holds no run, or one that was made from Python and cannot be followed again.
     """
     folder = Path(folder)
     record, case = read_record(folder), stored_case(folder)
@@ -216,6 +229,9 @@ def _resumable(folder: Path) -> Iterator[None]:
 @contextmanager
 def _begun(case: Case, outputs: Sequence[Drawing]) -> Iterator[None]:
     """Have the outputs of a case begin, and end with it."""
+    for output in outputs:
+        if not isinstance(output, Drawing):
+            raise TypeError(f"one of the outputs is {output!r}; give film or pictures, or outputs=() for numbers alone")
     try:
         for output in outputs:
             output.begin(case)

@@ -7,18 +7,18 @@ from pathlib import Path
 import solver
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.paraview import write_paraview_macro
-from blockvis.results.about import quantities_of
+from blockvis.results.about import Result, quantities_of, response_of
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.increments import folder_of
 from blockvis.results.viewer_files import ViewerFormat
 
 
-def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:
+def write(response: Result, folder: str | Path, *, overwrite: bool = False) -> Path:
     """Write the results folder of a response: VTU per increment, PVD, CSV and summary.json.
 
     Parameters
     ----------
-    response : solver.Response
+    response : solver.Response, solver.LimitLoad or solver.Envelope
     folder : str or Path
     overwrite : bool
         Whether results that are there already may be replaced.
@@ -29,6 +29,7 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     ValueError
         If the response is read from that very folder.
     """
+    response = response_of(response)
     sources = {folder_of(increment) for increment in response.increments} - {None}
     if any(source is not None and source.resolve() == Path(folder).resolve() for source in sources):
         raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")

@@ -29,7 +29,7 @@ from solver.results.increment import Bonds, State
 from solver.results.response import LimitLoad, LimitStatus
 from solver.ties import Tie, TieForces, check_ties, is_member, plastic_forces, slack, ties_as_drawn
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION, USED_UP
-from solver.words import checked, counted, plain
+from solver.words import checked, plain
 
 
 def find_limit_load(
@@ -267,9 +267,7 @@ def remaining(assembly: Assembly, fallen: np.ndarray | None) -> Assembly:
     """The assembly with blocks that have left, (n_blocks,) bool array, no longer free."""
     if fallen is None:
         return assembly
-    if np.shape(fallen) != (assembly.n_blocks,) or np.asarray(fallen).dtype != bool:
-        raise ValueError(f"fallen is {fallen!r}; give a bool for each of the {counted(assembly.n_blocks, 'block')}")
-    return assembly.with_roles(np.where(fallen, FIXED, assembly.roles))
+    return assembly.with_roles(np.where(assembly.flags(fallen, "fallen"), FIXED, assembly.roles))
 
 
 def checked_live(assembly: Assembly, loads: Loads) -> Loads:

@@ -181,8 +181,8 @@ def _check_changes(
         if change.dead is not None:
             beside = (change.dead_arms, None, change.dead_acceleration)
             checked_loads(assembly, Loads(change.dead, change.dead, (), *beside))
-        if change.removed is not None and np.shape(change.removed) != (assembly.n_blocks,):
-            raise ValueError(f"removed has shape {np.shape(change.removed)}; give one per block, {assembly.n_blocks}")
+        if change.removed is not None:
+            assembly.flags(change.removed, "removed")
         for name in change.ties:
             if name not in {tie.name for tie in ties if tie.phase <= change.phase}:
                 raise ValueError(

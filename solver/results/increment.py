@@ -230,10 +230,8 @@ class Increment(HasState):
 
     def __repr__(self) -> str:
         """One line, without arrays."""
-        return (
-            f"<Increment {self.status} at {self.parameter:g}, reaction {self.reaction:.6g}, "
-            f"load multiplier {self.load_multiplier:.6g}>"
-        )
+        loads = f"reaction {self.reaction:.6g}, load multiplier {self.load_multiplier:.6g}"
+        return f"<Increment {self.status} at {self.parameter:g}, {loads}>"
 
     def with_arrays(self, **arrays: Any) -> Increment:
         """Replace some of the arrays, fields of :class:`State`; the others are in memory then."""

@@ -51,7 +51,7 @@ class Collapse(Shown):
     displacement: float
     bracket: tuple[float, float]
     reaction: float | None
-    mechanism: np.ndarray
+    mechanism: np.ndarray = field(repr=False)
     unit: str = "m"
     words: str = ""
     lost: str = "equilibrium"
@@ -409,19 +409,12 @@ class LimitLoad(HasState, Shown):
     @property
     def increment(self) -> Increment:
         """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
-        return Increment(
-            parameter=0.0,
-            measured=self.multiplier,
-            phase=0,
-            load_multiplier=self.multiplier,
-            # A moment has no resultant, at any multiplier.
-            reaction=self.multiplier * self.live_force if self.live_force else 0.0,
-            certificate=self.certificate,
-            status=Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM,
-            programs=self.programs,
-            seconds=0.0,
-            held=self.state,
-        )
+        status = Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM
+        # A moment has no resultant, at any multiplier.
+        reaction = self.multiplier * self.live_force if self.live_force else 0.0
+        numbers: Any = {"parameter": 0.0, "measured": self.multiplier, "load_multiplier": self.multiplier, "phase": 0}
+        beside: Any = {"certificate": self.certificate, "status": status, "programs": self.programs, "seconds": 0.0}
+        return Increment(**numbers, reaction=reaction, **beside, held=self.state)
 
     @property
     def response(self) -> Response:
@@ -455,7 +448,7 @@ class LimitLoad(HasState, Shown):
 
 
 @dataclass(frozen=True, eq=False)
-class Envelope:
+class Envelope(Shown):
     """Limit loads for several positions of a live load.
 
     Attributes

@@ -23,7 +23,7 @@ STAR = [[(1 + k % 2) * math.cos(k * math.pi / 1250), (1 + k % 2) * math.sin(k * 
         ({"blocks": [{"outline": "abc"}]}, "block 'block 0' has no outline of numbers"),
         ({"blocks": [{"name": "a", "outline": RING[:2]}]}, r"block 'a' needs at least three corners .*\(2, 2\)"),
         ({"blocks": [{"name": "a", "outline": [[0, 0], [1, float("nan")], [1, 1]]}]}, "'a' has a corner at .*nan"),
-        ({"blocks": [{"name": "a", "outline": RING, "role": "loose"}]}, "block 'a' has role 'loose' in the file"),
+        ({"blocks": [{"name": "a", "outline": RING, "role": "loose"}]}, "block 'a' has role 'loose'"),
         (
             {"blocks": [{"name": "a", "outline": RING, "thickness": "thick"}]},
             r"a\.json': block 'a' has thickness 'thick'; give",

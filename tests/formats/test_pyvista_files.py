@@ -184,7 +184,7 @@ def test_cells_of_kinds_that_are_not_read_are_counted(tmp_path):
             "cells of the block 'block 0' differ in the cell array 'density', as 1000",
         ),
         ("role", [0, 1, 0], "differ in the cell array 'role', as 0 and 1"),
-        ("role", [1, 1, 5], "block 'block 1' has role '5' in the file; roles are free, fixed, moving"),
+        ("role", [1, 1, 5], "block 'block 1' has role '5'; roles are free, fixed, moving"),
     ],
 )
 def test_cells_that_say_different_things_of_one_block_are_refused(tmp_path, key, values, says):

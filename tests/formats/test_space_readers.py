@@ -253,7 +253,7 @@ def test_an_assembly_and_polyhedra_of_compas(dome, tmp_path):
         ({"faces": BOX[:5]}, "block 'a': the surface is not closed"),
         ({"points": None}, "block 'a' has no points"),
         ({"faces": [[0, 1, float("inf")], *BOX]}, r"block 'a' has no points \[\[x, y, z\], ...\] and faces"),
-        ({"role": "fix"}, "has role 'fix' in the file"),
+        ({"role": "fix"}, "has role 'fix'"),
     ],
 )
 def test_damaged_layouts_are_refused_by_name(change, reason, tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,6 +50,57 @@ def test_a_role_that_matches_nothing_lists_the_names_nearest_first(row):
         read(drawing, roles={"left sprnger": "fixed"})
     with pytest.raises(ValueError, match="roles: 'voussoirs' has role 'fxed'; roles are free, fixed, moving"):
         read(drawing, roles={"voussoirs": "fxed"})
+
+
+def test_a_layout_is_changed_and_assembled(row):
+    """A mask chose the blocks 0 and 1 again and again."""
+    layout = blockvis.read_layout(row(3))
+    kept = np.array(layout.names) != "brick 2"
+    for blocks in (kept, kept.tolist(), [0, 2], np.array([0, 2])):
+        assert layout.chosen(blocks).names == ("brick 1", "brick 3")
+    assert layout.chosen([]).n_blocks == 0
+    changed = replace(layout.chosen(kept), roles=np.array(["fixed", "free"]), density=[1800, np.nan])
+    assembly = blockvis.assemble(changed, density=2200.0)
+    assert (assembly.density.tolist(), assembly.free.tolist()) == ([1800.0, 2200.0], [False, True])
+    assert repr(layout).startswith("<Layout of 3 blocks of '")
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        (lambda layout: layout.chosen([7]), ValueError, r"no blocks \[7\]; give numbers from 0 to 1, or a bool each"),
+        (lambda layout: layout.chosen(["brick 1"]), ValueError, r"no blocks \['brick 1'\]; give numbers"),
+        (
+            lambda layout: replace(layout, density=1800.0),
+            ValueError,
+            r"2 blocks but density of shape \(\); give one number per",
+        ),
+        (
+            lambda layout: replace(layout, thickness=[1.0]),
+            ValueError,
+            r"2 blocks but thickness of shape \(1,\); give one",
+        ),
+        (lambda layout: replace(layout, roles=("free", "fred")), ValueError, "block 'brick 2' has role 'fred'"),
+        (lambda layout: blockvis.assemble(layout.source), TypeError, "str is no Layout.*blockvis.read takes a file"),
+        (lambda layout: blockvis.assemble(layout, supports={"name": "g"}), TypeError, "supports are .*; give a list"),
+        (
+            lambda layout: read_layout(layout.source, dimension=3, thickness=-1),
+            ValueError,
+            "has thickness -1 m; give a",
+        ),
+        (lambda layout: read_layout(layout.source, dimension=3, thickness=np.nan), ValueError, "has thickness nan m"),
+        (lambda layout: read_layout(layout.source, dimension=3, thickness="1"), ValueError, "thickness is '1'; give a"),
+        (lambda layout: blockvis.assemble(layout, density={"wall": 1}), ValueError, "density is {'wall': 1}; give num"),
+        (
+            lambda layout: blockvis.assemble(layout, roles=["free"] * 2),
+            TypeError,
+            r"roles are \['free', 'free'\]",
+        ),
+    ],
+)
+def test_what_a_layout_is_changed_to_is_checked(row, change, error, message):
+    with pytest.raises(error, match=message):
+        change(blockvis.read_layout(row(2)))
 
 
 def test_supports_are_added_and_checked(row):

@@ -77,6 +77,31 @@ def test_roles():
         assembly.with_roles(["fixed"])
 
 
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"density": -1.0}, r"block 0 \('block 0'\) has density -1 kg/m³"),
+        ({"density": [1.0]}, r"density has shape \(1,\); give one number or 2"),
+        ({"roles": ["free", "hanging"]}, "block 'block 1' has role 'hanging'"),
+        ({"names": ["a"]}, "2 blocks but 1 names"),
+        ({"materials": ("brick",)}, "2 blocks but 1 materials"),
+    ],
+)
+def test_what_is_replaced_is_checked(changed, message):
+    """Blocks of a negative density weighed less than nothing, and those of an unknown role were none."""
+    assembly = solver.Assembly.from_outlines([SQUARE, U_BLOCK])
+    with pytest.raises(ValueError, match=message):
+        replace(assembly, **changed)
+
+
+def test_one_density_is_that_of_every_block():
+    """It was an array without blocks."""
+    assembly = replace(solver.Assembly.from_outlines([SQUARE, U_BLOCK], names=["sill", "pier"]), density=1800)
+    assert assembly.density.tolist() == [1800.0, 1800.0]
+    with pytest.raises(ValueError, match=r"no block is named 'Pier' \(did you mean 'pier'\?\); the assembly has 2"):
+        assembly.index("Pier")
+
+
 def test_names():
     assembly = solver.Assembly.from_outlines([SQUARE, U_BLOCK], names=["key", "pier"])
     assert assembly.index("pier") == 1

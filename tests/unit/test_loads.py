@@ -13,6 +13,8 @@ ASSEMBLY = solver.Assembly.from_outlines(OUTLINES, names=["brick", "base", "pier
 PUSH = solver.Settlement(direction=(1, 0))
 START = solver.Pose.initial(ASSEMBLY)
 
+WITHOUT_FILL = dataclasses.replace(solver.self_weight(ASSEMBLY), fills=["fill"])
+
 MOTIONS = {
     "translation": {"direction": (3, -4)},
     "rotation": {"rotation_centre": (2, 7), "rotation": -1},
@@ -42,9 +44,9 @@ def test_point_load_has_the_moment_of_its_arm():
 @pytest.mark.parametrize(
     ("force", "point", "message"),
     [
-        ((1, 0), (1.5,), r"a point is \[1.5\]; give 2 numbers, one per axis"),
+        ((1, 0), (1.5,), r"a point is 1.5; give 2 numbers per block, one per axis"),
         ((1, 0), 1.5, r"a point is 1.5; give 2 numbers"),
-        ((5,), None, r"a force is \[5.0\]; give 2 numbers"),
+        ((5,), None, r"a force is 5.0; give 2 numbers"),
         ((1, 0, 0), (0, 0), r"a force is \[1.0, 0.0, 0.0\]; give 2 numbers"),
     ],
 )
@@ -190,6 +192,22 @@ def test_friction_given_in_degrees_warns():
         ),
         (lambda: solver.Interfaces(pairs={"ab": solver.InterfaceLaw()}), "a law for 'ab'; give it for two materials"),
         (lambda: solver.Interfaces(ground={"g": "x"}), "stiffness of the ground under 'g' is the text 'x'"),
+        (
+            lambda: solver.Structure(ASSEMBLY, friction_coefficient=1, loads=WITHOUT_FILL),
+            "one of the fills is 'fill'; give solver.Backfill",
+        ),
+        (lambda: solver.Interfaces(scatter=0.1), r"scatter of interfaces is 0\.1; give solver\.JointScatter"),
+        (lambda: solver.settle(ASSEMBLY, None), r"direction is \(None,\); give a sequence of numbers"),
+        (
+            lambda: solver.settle(ASSEMBLY, (1, 0), friction_coefficient=0.3, interfaces=solver.Interfaces()),
+            "either a friction_coefficient or interfaces; give one of them",
+        ),
+        (
+            lambda: solver.PointForces([0, 1], [[0, 1]], [[0, 0]]).load(ASSEMBLY),
+            r"a force is \[0, 1\]; give 2 numbers per block",
+        ),
+        (lambda: solver.self_weight(ASSEMBLY).with_forces(ASSEMBLY, np.zeros((3, 3))), "give solver.PointForces"),
+        (lambda: solver.edge_pressure(ASSEMBLY, 0, 1.5, 1.0), "edge is 1.5; give a whole number"),
         (lambda: solver.JointScatter(2.5, np.sqrt), "seed is 2.5; give a whole number"),
         (lambda: solver.JointScatter(-1, np.sqrt), "seed is -1; give a whole number of at least 0"),
         (lambda: solver.Tie("t", (0, 1), ((0, 0), (1, 1)), 1e6, brittle="no"), "brittle is the text 'no'; give True"),
@@ -299,10 +317,12 @@ def test_blocks_that_are_not_there_are_told_from_those_that_are(make, numbers):
 
 
 @pytest.mark.parametrize("kind", ["Dead", "Live", None])
-def test_forces_are_dead_or_live(kind):
+def test_loads_are_dead_or_live(kind):
     """Another word was taken for live, and a settlement leaves live loads out."""
-    with pytest.raises(ValueError, match=f"kind of the forces is {kind!r}; it is 'dead' or 'live'"):
+    with pytest.raises(ValueError, match=f"kind of the load is {kind!r}; it is 'dead' or 'live'"):
         solver.self_weight(ASSEMBLY).with_forces(ASSEMBLY, solver.PointForces.at(0, (0, -1), (1, 1)), kind)
+    with pytest.raises(ValueError, match=f"kind of the load is {kind!r}"):
+        solver.self_weight(ASSEMBLY).with_acceleration(ASSEMBLY, (1, 0), kind)
 
 
 def test_forces_at_points_take_lists():

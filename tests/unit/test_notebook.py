@@ -81,3 +81,27 @@ def test_an_assembly_is_shown_block_by_block():
     rows = {row[0].text: row[1].text for row in shown.iter("tr")}
     assert rows["blocks"] == "2: 1 free, 1 moving"
     assert rows["weight"] == "19.62 kN"
+
+
+def test_limit_loads_are_shown_and_written_as_responses_are(tmp_path):
+    """A limit load and an envelope ended in an AttributeError where only some of the functions knew them."""
+    arch = solver.Structure(generators.arch(voussoirs=4), friction_coefficient=0.7)
+    limit = arch.limit_load(acceleration=(1, 0))
+    envelope = arch.envelope([0.1, 0.3], lambda x: solver.force_on_top(arch.assembly, x, (0, -100)))
+    for name, result, count in (("limit", limit, 1), ("envelope", envelope, 2)):
+        again = blockvis.open_results(blockvis.write(result, tmp_path / name))
+        assert again.load_multiplier == pytest.approx(result.response.load_multiplier)
+        assert len(again.path) == count
+        assert "data:image/png" in result._repr_html_()
+        assert "load multiplier" in blockvis.show(result)._repr_html_()
+        assert Image.open(blockvis.draw_still(result, -1, tmp_path / f"{name}.png", size=(320, 240))).width == 320
+        assert len(list(blockvis.animate(result, tmp_path / f"{name} film", size=(320, 240), fps=2).iterdir())) > 2
+    for make in (blockvis.write, blockvis.animate, blockvis.draw_curve, blockvis.draw_mechanism, blockvis.write_report):
+        with pytest.raises(
+            TypeError, match="Assembly is no response; give what settle, pushover or limit_load returns"
+        ):
+            make(arch.assembly, tmp_path / "x.png" if make is not blockvis.write_report else tmp_path / "x.html")
+    with pytest.raises(TypeError, match="NoneType is no response"):
+        blockvis.show(None)
+    with pytest.raises(TypeError, match=r"the increment is 'x\.png'; give its number, 0 to 0, or -1 for the last"):
+        blockvis.draw_still(limit, "x.png", 0)

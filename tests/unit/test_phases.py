@@ -635,7 +635,8 @@ def test_a_collapse_before_the_supports_turn_is_read_back_in_metres(
         ({"dead": np.zeros((6, 2))}, r"dead loads have shape \(6, 2\); give \(6, 3\)"),
         ({"phase": 0.5}, "phase of a change is 0.5; give a whole number, 0 to 1"),
         ({"phase": 2}, "phase of a change is 2; give a whole number, 0 to 1"),
-        ({"removed": np.array([3])}, r"removed has shape \(1,\); give one per block, 6"),
+        ({"removed": np.array([3])}, r"removed is array\(\[3\]\); give a bool for each of the 6 blocks"),
+        ({"removed": np.arange(6)}, r"removed is .*; give a bool for each of the 6 blocks"),
     ],
 )
 def test_changes_that_do_not_fit_the_blocks_are_refused(change: dict[str, Any], message: str) -> None:

@@ -47,11 +47,12 @@ def test_a_structure_keeps_the_loads_that_it_was_made_of(block):
 
 def test_ties_changes_fills_and_forces_keep_what_they_were_made_of(block):
     """Of two ties made in one array both were at the second, and a finished response changed its loads."""
-    removed, dead, arms, ends = np.zeros(2), np.zeros((2, 3)), np.zeros((2, 2, 2)), np.array([[0.5, 1.0], [5.0, 1.0]])
+    removed, thin, dead, arms = np.zeros(2, dtype=bool), np.zeros(2), np.zeros((2, 3)), np.zeros((2, 2, 2))
+    ends = np.array([[0.5, 1.0], [5.0, 1.0]])
     change = solver.PhaseChange(0, removed=removed, dead=dead, dead_arms=arms, ties=["rod"])
-    fill = solver.Backfill(pieces=arms, block=np.zeros(2, dtype=int), surface=1.0, unit_weight=1.0, thickness=removed)
-    rod, forces = solver.Tie("rod", (1, None), ends, 1e6), solver.PointForces([0, 0], removed, ends)
-    for array in (removed, dead, arms, ends):
+    fill = solver.Backfill(pieces=arms, block=np.zeros(2, dtype=int), surface=1.0, unit_weight=1.0, thickness=thin)
+    rod, forces = solver.Tie("rod", (1, None), ends, 1e6), solver.PointForces([0, 0], thin, ends)
+    for array in (removed, thin, dead, arms, ends):
         array[:] = 7.0
     for kept in (change.removed, change.dead, change.dead_arms, fill.pieces, fill.thickness, forces.force):
         assert not kept.any()
