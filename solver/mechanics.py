@@ -41,7 +41,7 @@ from .results.quantities import (
     reaction_to,
     settlement_in,
 )
-from .results.response import Control, lowest, path_parameters, total_weight
+from .results.response import lowest, path_parameters, total_weight
 from .ties import (
     ABSENT,
     BAR,
@@ -67,7 +67,7 @@ from .words import counted
 __all__ = [
     "ABSENT", "BAR", "BROKEN", "CONTROL_DISPLACEMENT", "ELASTIC", "FIXED", "FREE", "INCREMENTS", "LOAD_MULTIPLIER",
     "LOAD_POSITION", "MOVING", "PROP", "REACTION", "ROLES", "SETTLEMENT", "SLACK", "TIE", "TIE_KINDS", "YIELDING",
-    "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Control", "Ending", "Increments",
+    "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Ending", "Increments",
     "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes", "State", "Stepper",
     "StoredState", "TieForces", "block_forces", "carried", "check_settlement", "corners_and_edges",
     "counted", "falling_blocks", "features_of", "find_contacts", "is_member", "joined_contacts", "lowest",

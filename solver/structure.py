@@ -18,9 +18,8 @@ from .analysis.settlement import settlement_increments
 from .assembly import Assembly
 from .interfaces import InterfaceLaw, Interfaces, uniform
 from .kinematics import Pose
-from .loads import Loads, PointForces, Settlement, checked_loads
+from .loads import ControlDisplacement, Loads, PointForces, Settlement, checked_loads
 from .path.controls import Controls
-from .path.drivers import ControlDisplacement
 from .phases import PhaseChange
 from .results.increment import Bonds, Increment
 from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, reaction_to, settlement_in
@@ -335,15 +334,13 @@ def settle(
     friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     loads: Loads | None = None,
-    controls: Controls | None = None,
-    on_increment: Callable[[Increment], None] | None = None,
+    **options: Any,
 ) -> Response:
-    """Follow blocks through the settlement of their supports to collapse: :meth:`Structure.settle` in one call.
+    """Follow blocks through the settlement of their supports: :meth:`Structure.settle`, with its options, in one call.
 
     The friction coefficient is of every interface, where ``interfaces`` are not given.
     """
-    structure = Structure(assembly, interfaces or uniform(friction_coefficient), loads)
-    return structure.settle(settlement, controls=controls, on_increment=on_increment)
+    return Structure(assembly, interfaces or uniform(friction_coefficient), loads).settle(settlement, **options)
 
 
 def pushover(

@@ -32,10 +32,10 @@ class Course:
     parameter: mechanics.Quantity
     measured: mechanics.Quantity
     settlements: tuple[solver.Settlement, ...] = ()  #: Along which they run, or after which they begin.
-    control: mechanics.Control | None = None  #: What drives the parameter where no settlement does.
+    control: solver.ControlDisplacement | None = None  #: What drives the parameter where no settlement does.
 
     @property
-    def drivers(self) -> tuple[mechanics.Control, ...]:
+    def drivers(self) -> tuple[solver.Settlement | solver.ControlDisplacement, ...]:
         """How far the parameter goes in each phase; empty where no limit is known."""
         return phases_of(self) if self.control is None else (self.control,)
 

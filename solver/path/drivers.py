@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from solver import tolerances
 from solver.assembly import Assembly, find_contacts
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_matrices
-from solver.loads import Settlement, check_fits, check_steps, set_vectors
+from solver.loads import ControlDisplacement, Settlement
 from solver.program.model import Model
-from solver.words import make_plain
 
 
 class Driver(ABC):
@@ -97,47 +95,6 @@ class SupportMotion(Driver):
     def rate(self, s: float) -> np.ndarray:
         """Of the settlement."""
         return self.phase.rate(self.assembly, self.start, s)
-
-
-@dataclass(frozen=True)
-class ControlDisplacement:
-    """The control displacement of a pushover analysis.
-
-    Attributes
-    ----------
-    block : str
-        Name of a free block.
-    direction : (d,) sequence, optional
-        Direction in which the displacement counts; only its direction matters. Along x by default.
-    point : (d,) sequence, optional [m]
-        A point of the block, in the drawing; its centroid by default.
-    increment : float [m]
-        Largest step.
-    limit : float [m]
-        Largest control displacement.
-    tolerance : float, optional [m]
-        Width of the bracket of the displacement at the end; a hundredth of the increment by default.
-    """
-
-    block: str
-    direction: Sequence[float] | None = None
-    point: Sequence[float] | None = None
-    increment: float = 0.01
-    limit: float = 1.0
-    tolerance: float | None = None
-    #: Of the control displacement.
-    unit: ClassVar[str] = "m"
-
-    def __post_init__(self) -> None:
-        """Check the numbers; the direction becomes a unit vector."""
-        make_plain(self)
-        units = {"direction": "direction in which the displacement counts"}
-        set_vectors(self, "control", {"direction": (2, 3), "point": (2, 3)}, units)
-        check_steps(self, "control")
-
-    def check_dimension(self, assembly: Assembly) -> None:
-        """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
-        check_fits(assembly, "control", {"direction": self.direction, "point": self.point})
 
 
 class ControlledLoad(Driver):
