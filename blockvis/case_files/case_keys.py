@@ -426,7 +426,7 @@ ANALYSIS_KEYS = (
     Key("kind", _KIND,
         "Settlement: until equilibrium is lost; limit load: the multiplier of the live loads at failure; pushover: "
         "the multiplier over a control displacement", "limit load", default=next(iter(KINDS))),
-    Key("increments", one_of(mechanics.INCREMENTS),
+    Key("increments", one_of((mechanics.COULOMB, mechanics.LINEAR_PROGRAM)),
         'How increments are found: "coulomb", the path that friction without lift leaves, or "linear program", one '
         "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
         default="coulomb"),

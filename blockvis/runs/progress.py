@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 import solver
-from blockvis.kinds.kind import Course
+from blockvis.results.about import Course
 from solver import mechanics
 from solver.mechanics import counted
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,7 +14,7 @@ from solver.loads import ControlDisplacement, Settlement
 from solver.program.model import Model
 
 
-class Driver(ABC):
+class Driver:
     """The parameter of a path: what it moves, how far, and in which increments, from a pose."""
 
     #: Name of the parameter.
@@ -40,13 +39,13 @@ class Driver(ABC):
         stop = min([multiple, *(stop for stop in self.stops if stop > s + near)])
         return self.limit if self.limit - stop < near else stop
 
-    @abstractmethod
     def supports(self, s: float) -> Pose:
-        """Pose of the supports; that of free blocks has no meaning."""
+        """Pose of the supports, by default as at the start; that of free blocks has no meaning."""
+        return self.start
 
-    @abstractmethod
     def rate(self, s: float) -> np.ndarray:
-        """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
+        """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter, by default zero."""
+        return np.zeros((self.assembly.n_blocks, self.start.positions.shape[1] + self.start.rotations.shape[1]))
 
     def lever(self, model: Model) -> float:
         """Largest displacement that it prescribes, per unit of it."""
@@ -113,14 +112,6 @@ class ControlledLoad(Driver):
             f"the mechanism does not move block '{chosen.block}' along {chosen.direction or 'x'}; turn the "
             "direction round if it moves it the other way, or choose another control block, point or direction"
         )
-
-    def supports(self, s: float) -> Pose:
-        """As at the start."""
-        return self.start
-
-    def rate(self, s: float) -> np.ndarray:
-        """Zero."""
-        return np.zeros((self.assembly.n_blocks, self.start.positions.shape[1] + self.start.rotations.shape[1]))
 
     def control_displacement(self, pose: Pose) -> float:
         """Since the start [m]."""
