@@ -357,8 +357,7 @@ def _add(mesh: _Mesh, dimension: int, kind: int, nodes: np.ndarray, tags: np.nda
         mesh.rings.append(_known(mesh, ring_of_nodes(nodes, GMSH[kind])))
         mesh.surfaces.append(tags)
     elif dimension == 3 and kind in GMSH_SOLIDS:
-        corners = 1 + max(corner for face in GMSH_SOLIDS[kind] for corner in face)
-        mesh.solids.append((GMSH_SOLIDS[kind], _known(mesh, nodes[:, :corners])))
+        mesh.solids.append((GMSH_SOLIDS[kind], _known(mesh, nodes)))
         mesh.volumes.append(tags)
     else:
         mesh.other_elements += len(nodes)
