@@ -10,7 +10,7 @@ from .contact_step.stiffness import ContactRows
 from .equilibrium import block_forces, wrench_matrix
 from .geometry.contacts import Contacts, joined_contacts, matched_contacts
 from .geometry.outlines import overlap_depths
-from .geometry.polygons import Polygons, corners_and_edges, features_of
+from .geometry.polygons import Polygons, corners_and_edges
 from .geometry.polyhedra import Polyhedra
 from .geometry.portions import linked
 from .interfaces import steep_note
@@ -71,7 +71,7 @@ __all__ = [
     "TIE_KINDS", "YIELDING", "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Ending",
     "Increments", "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes",
     "State", "Stepper", "StoredState", "TieForces", "block_forces", "carried", "check_settlement", "corners_and_edges",
-    "counted", "falling_blocks", "features_of", "find_contacts", "is_member", "joined_contacts", "linked", "lowest",
+    "counted", "falling_blocks", "find_contacts", "is_member", "joined_contacts", "linked", "lowest",
     "matched_contacts", "mechanism_of", "member_contacts", "member_forces", "member_states", "minimise", "model_of",
     "motion_size", "moved", "moved_vertices", "overlap_depths", "path_parameters", "point_velocities",
     "present_members", "pushover_increments", "reaction_to", "rigid_parts", "rotation_matrices", "settlement_in",
