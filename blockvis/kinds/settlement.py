@@ -21,7 +21,6 @@ from blockvis.results.about import (
     least_reaction,
     loss_of,
     mechanism_text,
-    reaction_size,
     told_reaction,
     unit_and_phase,
     unit_in,
@@ -280,7 +279,7 @@ def _is_idle(response: solver.Response) -> bool:
 
 def _size(response: solver.Response, phase: int) -> float:
     """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
-    return reaction_size(response, _is_moment(response, phase))
+    return response.total_weight * (response.assembly.block_size if _is_moment(response, phase) else 1.0)
 
 
 def _is_moment(response: solver.Response, phase: int) -> bool:

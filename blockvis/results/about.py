@@ -80,11 +80,6 @@ def unit_and_phase(response: solver.Response, phase: int) -> str:
     return f"{unit_in(response, phase)}{in_phase(response, phase)}"
 
 
-def reaction_size(response: solver.Response, moment: bool) -> float:
-    """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
-    return response.total_weight * (response.assembly.block_size if moment else 1.0)
-
-
 def told_reaction(value: float, response: solver.Response, moment: bool) -> float:
     """Give a reaction [N, or N·m of a moment] as it is told: 0 where it is the rounding of none."""
     return value if abs(value) > rounding_of(response, moment) else 0.0
