@@ -81,7 +81,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("blocks", nargs="*", type=int, default=[40, 300, 1000])
     arguments = parser.parse_args()
-    print(f"{'blocks':>7} {'points':>7} {'seconds':>8} {'iterations':>10} {'violation':>9} {'gap':>8}")
+    print(f"{'blocks':>7} {'points':>7} {'seconds':>8} {'violation':>9} {'gap':>8}")
     for blocks in arguments.blocks:
         assembly = wall(blocks)
         program, points = program_of(assembly)
@@ -89,7 +89,7 @@ def main() -> None:
         found, _ = solve.run_clarabel(program, "clarabel")
         seconds = time.process_time() - started
         print(
-            f"{int(assembly.free.sum()):7} {points:7} {seconds:8.2f} {found.iterations:10} "
+            f"{int(assembly.free.sum()):7} {points:7} {seconds:8.2f} "
             f"{found.violation:9.1e} {found.gap:8.1e}   {found.objective:.9g}"
         )
 

@@ -44,13 +44,12 @@ def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
 
 def _mesh_reader(path: str, **options: Any) -> Any:
     """Read a .msh file of flat blocks as a layout; leave every other to PyVista."""
+    problem: ValueError | None = None
     try:
         if holds_flat_blocks(Path(path)):
             return _reader(path, **options)
     except ValueError as error:
-        problem: ValueError | None = error
-    else:
-        problem = None
+        problem = error
     try:
         return pv.read_meshio(path)
     except (SystemExit, Exception):
@@ -166,12 +165,8 @@ class BlockvisAccessor:
         _check_options(options)
         if interfaces is None and friction_coefficient is None:
             friction_coefficient = solver.InterfaceLaw.friction_coefficient
-        return solver.Structure(
-            self.assembly(roles, **options),
-            interfaces,
-            loads,
-            friction_coefficient=None if interfaces is not None else friction_coefficient,
-        )
+        assembly = self.assembly(roles, **options)
+        return solver.Structure(assembly, interfaces, loads, friction_coefficient=friction_coefficient)
 
     def settle(
         self,

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .interfaces import JointScatter as JointScatter
     from .kinematics import Pose as Pose
     from .loads import GRAVITY as GRAVITY
+    from .loads import ControlDisplacement as ControlDisplacement
     from .loads import Loads as Loads
     from .loads import PointForces as PointForces
     from .loads import Settlement as Settlement
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from .loads import self_weight as self_weight
     from .loads import weight_fraction as weight_fraction
     from .path.controls import Controls as Controls
-    from .path.drivers import ControlDisplacement as ControlDisplacement
     from .phases import PhaseChange as PhaseChange
     from .programs.problem import SolveError as SolveError
     from .results.certificate import Certificate as Certificate
@@ -62,9 +62,8 @@ _NAMES = {
     "backfill": "Backfill",
     "interfaces": "InterfaceLaw Interfaces JointScatter",
     "kinematics": "Pose",
-    "loads": "GRAVITY Loads PointForces Settlement point_load self_weight weight_fraction",
+    "loads": "GRAVITY ControlDisplacement Loads PointForces Settlement point_load self_weight weight_fraction",
     "path.controls": "Controls",
-    "path.drivers": "ControlDisplacement",
     "phases": "PhaseChange",
     "programs.problem": "SolveError",
     "results.certificate": "Certificate",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -362,6 +362,47 @@ class Settlement:
             return travel, angle, np.zeros(d)
         axis = np.ones(1) if self.rotation_axis is None else np.asarray(self.rotation_axis)
         return travel, self.rotation * s * axis, np.asarray(self.rotation_centre)
+
+
+@dataclass(frozen=True)
+class ControlDisplacement:
+    """The control displacement of a pushover analysis.
+
+    Attributes
+    ----------
+    block : str
+        Name of a free block.
+    direction : (d,) sequence, optional
+        Direction in which the displacement counts; only its direction matters. Along x by default.
+    point : (d,) sequence, optional [m]
+        A point of the block, in the drawing; its centroid by default.
+    increment : float [m]
+        Largest step.
+    limit : float [m]
+        Largest control displacement.
+    tolerance : float, optional [m]
+        Width of the bracket of the displacement at the end; a hundredth of the increment by default.
+    """
+
+    block: str
+    direction: Sequence[float] | None = None
+    point: Sequence[float] | None = None
+    increment: float = 0.01
+    limit: float = 1.0
+    tolerance: float | None = None
+    #: Of the control displacement.
+    unit: ClassVar[str] = "m"
+
+    def __post_init__(self) -> None:
+        """Check the numbers; the direction becomes a unit vector."""
+        make_plain(self)
+        units = {"direction": "direction in which the displacement counts"}
+        set_vectors(self, "control", {"direction": (2, 3), "point": (2, 3)}, units)
+        check_steps(self, "control")
+
+    def check_dimension(self, assembly: Assembly) -> None:
+        """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
+        check_fits(assembly, "control", {"direction": self.direction, "point": self.point})
 
 
 def check_steps(path: Any, what: str) -> None:

@@ -10,8 +10,9 @@ from .contact_step.stiffness import ContactRows
 from .equilibrium import block_forces, wrench_matrix
 from .geometry.contacts import Contacts, joined_contacts, matched_contacts
 from .geometry.outlines import overlap_depths
-from .geometry.polygons import Polygons, corners_and_edges, features_of
+from .geometry.polygons import Polygons, corners_and_edges
 from .geometry.polyhedra import Polyhedra
+from .geometry.portions import linked
 from .interfaces import steep_note
 from .kinematics import (
     carried,
@@ -24,7 +25,7 @@ from .kinematics import (
     turned,
     turned_moments,
 )
-from .path.controls import INCREMENTS, Ending
+from .path.controls import COULOMB, LINEAR_PROGRAM, Ending
 from .path.reports import falling_blocks
 from .path.state import PathState, Place
 from .path.stepping import NotSolved, Stepper
@@ -41,7 +42,7 @@ from .results.quantities import (
     reaction_to,
     settlement_in,
 )
-from .results.response import Control, lowest, path_parameters, total_weight
+from .results.response import lowest, path_parameters, total_weight
 from .ties import (
     ABSENT,
     BAR,
@@ -65,12 +66,12 @@ from .words import counted
 
 # Type checkers take no names from a typed package but those that it lists.
 __all__ = [
-    "ABSENT", "BAR", "BROKEN", "CONTROL_DISPLACEMENT", "ELASTIC", "FIXED", "FREE", "INCREMENTS", "LOAD_MULTIPLIER",
-    "LOAD_POSITION", "MOVING", "PROP", "REACTION", "ROLES", "SETTLEMENT", "SLACK", "TIE", "TIE_KINDS", "YIELDING",
-    "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Control", "Ending", "Increments",
-    "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes", "State", "Stepper",
-    "StoredState", "TieForces", "block_forces", "carried", "check_settlement", "corners_and_edges",
-    "counted", "falling_blocks", "features_of", "find_contacts", "is_member", "joined_contacts", "lowest",
+    "ABSENT", "BAR", "BROKEN", "CONTROL_DISPLACEMENT", "COULOMB", "ELASTIC", "FIXED", "FREE", "LINEAR_PROGRAM",
+    "LOAD_MULTIPLIER", "LOAD_POSITION", "MOVING", "PROP", "REACTION", "ROLES", "SETTLEMENT", "SLACK", "TIE",
+    "TIE_KINDS", "YIELDING", "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Ending",
+    "Increments", "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes",
+    "State", "Stepper", "StoredState", "TieForces", "block_forces", "carried", "check_settlement", "corners_and_edges",
+    "counted", "falling_blocks", "find_contacts", "is_member", "joined_contacts", "linked", "lowest",
     "matched_contacts", "mechanism_of", "member_contacts", "member_forces", "member_states", "minimise", "model_of",
     "motion_size", "moved", "moved_vertices", "overlap_depths", "path_parameters", "point_velocities",
     "present_members", "pushover_increments", "reaction_to", "rigid_parts", "rotation_matrices", "settlement_in",

@@ -18,9 +18,8 @@ from .analysis.settlement import settlement_increments
 from .assembly import Assembly
 from .interfaces import InterfaceLaw, Interfaces, steep_note
 from .kinematics import Pose
-from .loads import Loads, PointForces, Settlement, checked_loads
+from .loads import ControlDisplacement, Loads, PointForces, Settlement, checked_loads
 from .path.controls import Controls
-from .path.drivers import ControlDisplacement
 from .phases import PhaseChange
 from .results.increment import Bonds, Increment
 from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, reaction_to, settlement_in

@@ -36,6 +36,7 @@ from blockvis.cases.key import (
     one_of,
     pair_of,
     read_by,
+    table_of,
     whole,
 )
 from blockvis.cases.profiles import PROFILE, PROFILES
@@ -153,15 +154,13 @@ _SIGHT = ValueKind(
     {
         "anyOf": [
             {"enum": list(SIGHTS)},
-            {
-                "type": "object",
-                "properties": {
+            table_of(
+                {
                     "azimuth": {"type": "number", "minimum": -360, "maximum": 360},
                     "elevation": {"type": "number", "minimum": -90, "maximum": 90},
-                },
-                "additionalProperties": False,
-                "minProperties": 1,
-            },
+                }
+            )
+            | {"minProperties": 1},
         ]
     },
     read_by(read_sight),
@@ -171,12 +170,7 @@ _CUT = ValueKind(
     {
         "anyOf": [
             {"type": "string", "pattern": "^ *[xyz] *(= *[-+0-9.eE]+ *)?$"},
-            {
-                "type": "object",
-                "properties": {"point": TRIPLE.schema, "normal": TRIPLE.schema},
-                "required": ["normal"],
-                "additionalProperties": False,
-            },
+            table_of({"point": TRIPLE.schema, "normal": TRIPLE.schema}, ("normal",)),
         ]
     },
     read_by(read_cut),
@@ -276,18 +270,13 @@ GEOMETRY = Section(
 #: Keys of [geometry] of an image.
 OF_IMAGES = ("width", "height", "pixel", "background", "smallest")
 
-_ROLE = {"role": {"enum": list(mechanics.ROLES)}}
-
 
 def _by_place(coordinate: Mapping[str, Any], words: str) -> ValueKind:
     """Make the kind of tables that choose blocks by coordinates and give them a role."""
-    table = {
-        "type": "object",
-        "properties": {**{axis: dict(coordinate) for axis in "xyz"}, **_ROLE},
-        "additionalProperties": False,
-    }
+    role = {"enum": list(mechanics.ROLES)}
+    table = table_of(dict.fromkeys("xyz", coordinate) | {"role": role})
     words = f'table of {words} for x, y or z, and role ("fixed" if missing), or a list of such'
-    return ValueKind(words, {"anyOf": [table, {"type": "array", "items": table}, {"enum": list(mechanics.ROLES)}]})
+    return ValueKind(words, {"anyOf": [table, {"type": "array", "items": table}, role]})
 
 
 ROLES = Section(
@@ -426,7 +415,7 @@ ANALYSIS_KEYS = (
     Key("kind", _KIND,
         "Settlement: until equilibrium is lost; limit load: the multiplier of the live loads at failure; pushover: "
         "the multiplier over a control displacement", "limit load", default=next(iter(KINDS))),
-    Key("increments", one_of(mechanics.INCREMENTS),
+    Key("increments", one_of((mechanics.COULOMB, mechanics.LINEAR_PROGRAM)),
         'How increments are found: "coulomb", the path that friction without lift leaves, or "linear program", one '
         "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
         default="coulomb"),

@@ -275,7 +275,7 @@ def refuse_increment_seconds(case: Case, seconds: float | None) -> None:
     if seconds is not None and not seconds > 0.0:
         raise ValueError(f"increment_seconds is {seconds:g}; give seconds above 0")
     has_steps = bool(KINDS[case.analysis].course(case).drivers)
-    if seconds is not None and (not has_steps or case.controls.increments == mechanics.INCREMENTS[1]):
+    if seconds is not None and (not has_steps or case.controls.increments == mechanics.LINEAR_PROGRAM):
         raise ValueError(
             f"{case.source}: [analysis] increment_seconds is {seconds:g}; it is looked at after the steps of a path, "
             "which a limit load without a settlement and a linear program do not have: leave it out"

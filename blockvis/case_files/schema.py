@@ -6,7 +6,7 @@ import inspect
 from typing import Any
 
 from blockvis.case_files import case_keys
-from blockvis.cases.key import Section
+from blockvis.cases.key import Section, table_of
 from blockvis.generators import LAYOUTS
 from blockvis.generators.catalogue import described
 
@@ -36,12 +36,7 @@ def case_values() -> dict[str, Any]:
         "oneOf": [{"required": ["file"], "not": {"required": ["parameters"]}}, {"required": ["layout"]}],
         "allOf": [_parameters(layout) for layout in LAYOUTS],
     }
-    return {
-        "type": "object",
-        "properties": tables,
-        "required": [section.name for section in case_keys.SECTIONS if section.required],
-        "additionalProperties": False,
-    }
+    return table_of(tables, [section.name for section in case_keys.SECTIONS if section.required])
 
 
 def one_or_several(section: Section) -> dict[str, Any]:

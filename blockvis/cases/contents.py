@@ -106,11 +106,6 @@ class Case:
         return solver.InterfaceLaw(**{one.name: getattr(self, one.name) for one in fields(solver.InterfaceLaw)})
 
     @property
-    def laws(self) -> tuple[solver.InterfaceLaw, ...]:
-        """All laws."""
-        return self.law, *self.interfaces.values()
-
-    @property
     def ground(self) -> dict[str, float]:
         """Stiffness [Pa/m] of the ground under supports, by their names."""
         return {str(s["name"]): float(s["stiffness"]) for s in self.supports if s.get("stiffness") is not None}

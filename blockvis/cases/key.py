@@ -26,6 +26,12 @@ def list_of(item: Mapping[str, Any], least: int, most: int | None = None) -> dic
     return {"type": "array", "items": item, "minItems": least} | ({} if most is None else {"maxItems": most})
 
 
+def table_of(properties: Mapping[str, Any], required: Sequence[str] = ()) -> dict[str, Any]:
+    """Say, as JSON schema has it, that a value is a table with these keys and no others."""
+    needed = {"required": list(required)} if required else {}
+    return {"type": "object", "properties": properties} | needed | {"additionalProperties": False}
+
+
 #: What numbers that cannot be negative are, by their unit.
 _QUANTITIES = {"m": "length in m", "Pa": "stress in Pa"}
 

@@ -19,7 +19,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .block_at import block_at, blocks_called, distances_to, note_outside
-from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
+from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, table_of, whole
 from .profiles import STRAIGHT
 from .toml_table import Table, shortened
 
@@ -82,18 +82,8 @@ def _end(table: Table, key: Key) -> TieEnd | None:
     return TieEnd(fixed, fixed=True) if fixed is not None else TieEnd(point, block or "")
 
 
-_BY_BLOCK = {
-    "type": "object",
-    "properties": {"block": {"type": "string"}, "point": dict(VECTOR.schema)},
-    "required": ["block", "point"],
-    "additionalProperties": False,
-}
-_ON_GROUND = {
-    "type": "object",
-    "properties": {"fixed": dict(VECTOR.schema)},
-    "required": ["fixed"],
-    "additionalProperties": False,
-}
+_BY_BLOCK = table_of({"block": TEXT.schema, "point": VECTOR.schema}, ("block", "point"))
+_ON_GROUND = table_of({"fixed": VECTOR.schema}, ("fixed",))
 _END = ValueKind(
     "two numbers, in space three, or table: block and point, or fixed",
     {"anyOf": [VECTOR.schema, _BY_BLOCK, _ON_GROUND]},

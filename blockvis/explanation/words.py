@@ -98,14 +98,12 @@ def measurement_text(found: Explanation) -> str:
 
 def verdict(found: Explanation) -> str:
     """Say what the observations point at, in one sentence, which begins with names of supports as they are."""
-    if not found.causes:
-        if not found.stands:
-            return "No candidate stands at any amount: the structure does not stand as drawn"
+    if not found.causes and not found.stands:
+        return "No candidate stands at any amount: the structure does not stand as drawn"
+    n_made = int((found.observations.widths > 0.0).sum()) - len(found.made_by_none)
+    if not found.causes or (found.made_by_none and not n_made and not len(found.observations.points)):
         return "No candidate makes any of the observed cracks"
     best, others = found.causes[0], found.alike[1:]
-    none = set(found.made_by_none)
-    if none and len(none) == int((found.observations.widths > 0.0).sum()) and not len(found.observations.points):
-        return "No candidate makes any of the observed cracks"
     if others:
         named = [cause_text(cause) for cause in others[:NAMED]]
         rest = len(others) - len(named)

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from blockvis.layout.outlines import chords_of, sagitta
+from blockvis.layout.outlines import chords_of
 
 #: Ends of lines that miss another line by up to this fraction of the size of the drawing meet it, and so do the ends of
 #: an outline that misses itself by this fraction of its own size, and corners and the curves on which they lie: what
@@ -56,7 +56,7 @@ class Arc:
     @property
     def off(self) -> float:
         """Largest distance of its chords from it."""
-        return sagitta(self.radius, self.sweep / self.chords)
+        return self.radius * (1.0 - math.cos(self.sweep / self.chords / 2.0))
 
     @property
     def is_line(self) -> bool:

@@ -13,13 +13,12 @@ from scipy.sparse import coo_array
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
-from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, UPRIGHT, Note, kind_of
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells, spread_of
 from blockvis.layout.solids import fans
 from blockvis.text import numbered
 from solver import mechanics
-from solver.mechanics import counted
+from solver.mechanics import counted, linked
 
 from .bodies import Bodies, Body, with_role
 from .closed_surfaces import bodies_of_surfaces, enclosed
@@ -101,11 +100,11 @@ def _pieces(rings: Sequence[np.ndarray], owner: np.ndarray) -> np.ndarray:
     _, side = np.unique(np.column_stack([owner[cell], sides]), axis=0, return_inverse=True)
     _, corner = np.unique(np.column_stack([owner[cell], start]), axis=0, return_inverse=True)
     n = len(rings)
-    piece = linked(cell, n + side.ravel(), n + int(side.max()) + 1)[:n]
+    piece = linked((cell, n + side.ravel()), n + int(side.max()) + 1)[:n]
     at = np.unique(np.column_stack([piece[cell], corner.ravel()]), axis=0).T
     shared = coo_array((np.ones(at.shape[1]), at)).tocsr()
     one, other = (shared @ shared.T > 1.0).nonzero()
-    return linked(one, other, int(piece.max()) + 1)[piece]
+    return linked((one, other), int(piece.max()) + 1)[piece]
 
 
 def _enclosed(points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray]) -> Bodies:

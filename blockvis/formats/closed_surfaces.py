@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import ROUNDING, flattened, loops_of
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.solids import area_vectors, fans, sides_of
 from blockvis.layout.surfaces import same_points, turned_faces
 from blockvis.text import listed
-from solver.mechanics import counted
+from solver.mechanics import counted, linked
 
 from .bodies import Bodies, Body, as_drawn
 from .reading import Reading
@@ -87,14 +86,14 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
         )
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
     edge = inverse.ravel().reshape(-1, 3)
-    piece = linked(edge[:, [0, 0]].ravel(), edge[:, [1, 2]].ravel(), len(unique))[edge[:, 0]]
+    piece = linked((edge[:, [0, 0]].ravel(), edge[:, [1, 2]].ravel()), len(unique))[edge[:, 0]]
     return _pieces(part, points, _seen_from_outside(points, faces, edge, piece), piece, holes)
 
 
 def _connected(part: Body) -> np.ndarray:
     """(m,) int array: the piece of each face, of those that share points of the file."""
     faces = part.faces
-    of_points = linked(faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel(), len(part.points))
+    of_points = linked((faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel()), len(part.points))
     return np.unique(of_points[faces[:, 0]], return_inverse=True)[1].ravel()
 
 
@@ -173,7 +172,7 @@ def _touching_bodies(points: np.ndarray, faces: np.ndarray) -> np.ndarray | None
         if not (~forward[k][::2]).all() or not forward[k][1::2].all():
             return None
         partner[k[::2]], partner[k[1::2]] = k[1::2], k[::2]
-    piece = linked(owner, owner[partner], len(faces))
+    piece = linked((owner, owner[partner]), len(faces))
     return piece if (np.bincount(piece, _volumes(points, faces)) > 0.0).all() else None
 
 

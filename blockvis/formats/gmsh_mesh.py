@@ -204,8 +204,8 @@ def _entity_names(groups: list[str], tags: np.ndarray, kind: str) -> list[str]:
 
 
 def _sections(data: bytes) -> tuple[_Mesh, dict[str, dict[str, object]]]:
-    head = _section(data, "MeshFormat")
-    words = head.split(b"\n", 1)[0].split() if head else []
+    head, _, rest = (_section(data, "MeshFormat") or b"").partition(b"\n")
+    words = head.split()
     if len(words) < 3:
         raise ValueError("it is not a gmsh mesh: it has no section $MeshFormat; export it as .msh 4.1 or 2.2")
     version, binary, width = words[0].decode("ascii", "replace"), words[1] == b"1", words[2]
@@ -213,9 +213,7 @@ def _sections(data: bytes) -> tuple[_Mesh, dict[str, dict[str, object]]]:
         raise ValueError(
             f"it is version {version} of .msh; versions 2 and 4.1 are read: gmsh old.msh -save -format msh41 -o new.msh"
         )
-    order = "<"
-    if binary and head is not None:
-        order = "<" if head.split(b"\n", 1)[1][:4] == b"\x01\x00\x00\x00" else ">"
+    order = ">" if binary and rest[:4] != b"\x01\x00\x00\x00" else "<"
     # Sizes are read as signed numbers: no count of a real file reaches the sign bit, and a hostile one cannot wrap.
     wide = f"{order}i{8 if width == b'8' else 4}"
     mesh = _Mesh()
@@ -357,8 +355,7 @@ def _add(mesh: _Mesh, dimension: int, kind: int, nodes: np.ndarray, tags: np.nda
         mesh.rings.append(_known(mesh, ring_of_nodes(nodes, GMSH[kind])))
         mesh.surfaces.append(tags)
     elif dimension == 3 and kind in GMSH_SOLIDS:
-        corners = 1 + max(corner for face in GMSH_SOLIDS[kind] for corner in face)
-        mesh.solids.append((GMSH_SOLIDS[kind], _known(mesh, nodes[:, :corners])))
+        mesh.solids.append((GMSH_SOLIDS[kind], _known(mesh, nodes)))
         mesh.volumes.append(tags)
     else:
         mesh.other_elements += len(nodes)

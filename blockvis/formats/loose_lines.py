@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
-from blockvis.layout.outlines import ends_of, ring_width
+from blockvis.layout.outlines import ends_of, ring_of, ring_width
 from blockvis.layout.refusal import Refused
 from blockvis.text import as_toml, listed
 from solver.mechanics import counted
@@ -408,7 +408,7 @@ def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[
     at_border = [face for face in faces if face.exterior.intersection(border.buffer(2 * grid)).length > 10 * grid]
     if len(at_border) < 2 or any(len(face.interiors) for face in faces):
         return []
-    return [np.array(shapely.orient_polygons(face).exterior.coords)[:-1] for face in faces]
+    return [ring_of(face) for face in faces]
 
 
 def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
@@ -449,7 +449,7 @@ def _add_faces(
     whole, borders = list[Any](), list[set[int]]()
 
     def add(face: Any) -> None:
-        ring = np.array(shapely.orient_polygons(face).exterior.coords)[:-1]
+        ring = ring_of(face)
         border, lengths = _border(ring, tree, 2 * grid)
         nearest = np.array([lines[k].layer for k in border])
         # By length: an arc of many chords beside a stone, as the extrados beside a spandrel, would outvote its joints.

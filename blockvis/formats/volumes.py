@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.linked import equal_rows, linked
+from blockvis.layout.linked import equal_rows
+from solver.mechanics import linked
 
 from .bodies import Body
 
@@ -77,7 +78,7 @@ def _pieces(faces: np.ndarray, cell_of_face: np.ndarray, owner: np.ndarray) -> n
     one, other = (cell_of_face[face] for face in equal_rows(faces))
     kept = owner[one] == owner[other]
     one, other = one[kept], other[kept]
-    piece = linked(one, other, len(owner))
+    piece = linked((one, other), len(owner))
     return np.unique(np.column_stack([owner, piece]), axis=0, return_inverse=True)[1].ravel()
 
 

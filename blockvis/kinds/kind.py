@@ -17,27 +17,12 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
 from blockvis.formats.reading import naming
-from blockvis.results.about import phases_of
+from blockvis.results.about import Course
 from solver import mechanics
 from solver.mechanics import counted
 
 #: How a kind works its increments out, for :class:`solver.mechanics.Increments`.
 Steps = Generator[solver.Increment, None, mechanics.Ending]
-
-
-@dataclass(frozen=True)
-class Course:
-    """What the increments of an analysis run over and what is measured along them."""
-
-    parameter: mechanics.Quantity
-    measured: mechanics.Quantity
-    settlements: tuple[solver.Settlement, ...] = ()  #: Along which they run, or after which they begin.
-    control: mechanics.Control | None = None  #: What drives the parameter where no settlement does.
-
-    @property
-    def drivers(self) -> tuple[mechanics.Control, ...]:
-        """How far the parameter goes in each phase; empty where no limit is known."""
-        return phases_of(self) if self.control is None else (self.control,)
 
 
 @dataclass(frozen=True)
@@ -192,5 +177,5 @@ def needs_no_crushing(case: Case, when: str = "") -> None:
     interfaces = case_interfaces(case)
     with naming(str(case.source)):
         interfaces.refuse_crushing(f"a {case.analysis}{when}")
-        if case.controls.increments == mechanics.INCREMENTS[1]:
+        if case.controls.increments == mechanics.LINEAR_PROGRAM:
             interfaces.refuse_mortar(f'[analysis] increments = "{case.controls.increments}"')

@@ -142,7 +142,7 @@ class LimitLoadKind(AnalysisKind):
         needs_live_load(case)
         if case.settlements:
             needs_no_crushing(case, " after a settlement")
-        elif case.controls.increments == mechanics.INCREMENTS[1]:
+        elif case.controls.increments == mechanics.LINEAR_PROGRAM:
             raise ValueError(
                 f'{case.source}: [analysis] increments = "{case.controls.increments}" is of settlements, and the case '
                 "has none; leave it out"

@@ -15,12 +15,12 @@ from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
 from blockvis.formats.reading import naming
 from blockvis.results.about import (
+    Course,
     collapse_phase,
     in_phase,
     least_reaction,
     loss_of,
     mechanism_text,
-    reaction_size,
     told_reaction,
     unit_and_phase,
     unit_in,
@@ -31,10 +31,7 @@ from blockvis.text import force_text, listed
 from solver import mechanics
 from solver.mechanics import counted
 
-from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_no_crushing, without_increments
-
-#: The methods in words, as ``[analysis] increments`` has them.
-COULOMB, LINEAR_PROGRAM = mechanics.INCREMENTS
+from .kind import AnalysisKind, AnalysisRun, RunInput, needs_no_crushing, without_increments
 
 #: Difference of two reactions, in weights, of moments at a block's length, that is worth a line.
 NOTABLE = 1e-3
@@ -82,10 +79,10 @@ class SettlementKind(AnalysisKind):
                 stacklevel=5,
             )
         needs_no_crushing(case)
-        if case.settings and case.controls.increments == LINEAR_PROGRAM:
+        if case.settings and case.controls.increments == mechanics.LINEAR_PROGRAM:
             raise ValueError(
-                f'{case.source}: [analysis] range = true belongs to increments = "{COULOMB}"; a linear program knows '
-                "no compliance and no imperfection"
+                f'{case.source}: [analysis] range = true belongs to increments = "{mechanics.COULOMB}"; a linear '
+                "program knows no compliance and no imperfection"
             )
         return case
 
@@ -123,7 +120,7 @@ class SettlementKind(AnalysisKind):
 
         lines = list(map(": ".join, changes_told(response)))
         lines += [f"loss: {note}" for note in losses_of(response)]
-        if _method(response) == LINEAR_PROGRAM:
+        if _method(response) == mechanics.LINEAR_PROGRAM:
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
         if path:
             first = least_reaction(path[0])
@@ -282,7 +279,7 @@ def _is_idle(response: solver.Response) -> bool:
 
 def _size(response: solver.Response, phase: int) -> float:
     """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
-    return reaction_size(response, _is_moment(response, phase))
+    return response.total_weight * (response.assembly.block_size if _is_moment(response, phase) else 1.0)
 
 
 def _is_moment(response: solver.Response, phase: int) -> bool:
@@ -295,7 +292,7 @@ def _method(response: solver.Response) -> str | None:
     if not response.path:
         return None
     bounds = [(increment.least, increment.largest) for increment in response.path]
-    return LINEAR_PROGRAM if np.isnan(bounds).all() else COULOMB
+    return mechanics.LINEAR_PROGRAM if np.isnan(bounds).all() else mechanics.COULOMB
 
 
 def settlement_steps(

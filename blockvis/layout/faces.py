@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .linked import equal_rows, linked
+from solver.mechanics import linked
+
+from .linked import equal_rows
 from .outlines import ROUNDING
 from .solids import Solid, cross, off_planes, planes_of, sides_of, triangles_of, volume, width_of
 from .surfaces import cleaned
@@ -131,7 +133,7 @@ def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.
     along = np.einsum("ij,ij->i", normal[one], normal[other]) >= SAME_FACE
     # Polygons with re-entrant corners that were cut in fans have triangles that lie the other way round.
     same = (apart <= near) & (along | sliver[small] | (apart <= ROUNDING * longest[large]))
-    label = linked(one[same], other[same], len(triangles))
+    label = linked((one[same], other[same]), len(triangles))
     found = []
     for region in np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1]):
         if len(region) == 1 or _warp(points, triangles[region]) <= near:

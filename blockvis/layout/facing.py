@@ -9,10 +9,9 @@ import numpy as np
 import shapely
 
 import solver
-from solver.mechanics import counted
+from solver.mechanics import counted, linked
 
 from .faces import OFF_PLANE, flattened
-from .linked import linked
 from .outlines import ROUNDING
 from .solids import Solid, area_vectors, planes_of, volume, width_of
 from .surfaces import cleaned, is_closed
@@ -269,7 +268,7 @@ def _gap(faces: _Faces, a: int, b: int) -> float:
 
 def _groups(faces: _Faces, one: np.ndarray, other: np.ndarray, near: float) -> list[tuple[list[int], np.ndarray]]:
     """Group the faces that share a plane, and the side of it on which the block of each lies: 1 or -1."""
-    label = linked(one, other, len(faces.planes))
+    label = linked((one, other), len(faces.planes))
     groups = []
     for members in np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1]):
         if len(members) > 1:

@@ -3,15 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-
-def linked(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
-    """(n,) int array: the group of each of ``n`` things, of which pairs are linked; numbered by their first members."""
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1])
+from solver.mechanics import linked
 
 
 def middles(points: np.ndarray, group: np.ndarray) -> np.ndarray:
@@ -23,7 +17,7 @@ def middles(points: np.ndarray, group: np.ndarray) -> np.ndarray:
 def within_reach(points: np.ndarray, near: float) -> np.ndarray:
     """(n,) int array: the group of each of (n, d) points, of which those up to ``near`` apart are linked."""
     one, other = cKDTree(points).query_pairs(near, output_type="ndarray").reshape(-1, 2).T
-    return linked(one, other, len(points))
+    return linked((one, other), len(points))
 
 
 def equal_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

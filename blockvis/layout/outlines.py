@@ -373,8 +373,3 @@ def chords_of(sweep: float, radius: float, tolerance: float | None = None) -> in
     allowed = 1e-3 if tolerance is None else min(max(tolerance / max(radius, 1e-300), 1e-12), 1.0)
     widest = min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed))
     return min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), MOST_CHORDS)
-
-
-def sagitta(radius: float, angle: float) -> float:
-    """Largest distance of a chord from its arc of an angle [rad]."""
-    return radius * (1.0 - math.cos(angle / 2.0))

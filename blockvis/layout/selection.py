@@ -12,12 +12,11 @@ import numpy as np
 import shapely
 
 from blockvis.text import as_toml, by_similarity, listed, place_text
-from solver.mechanics import counted
+from solver.mechanics import counted, linked
 
 from .crossings import uncrossed
 from .layout import Layout
 from .left_out import ENTITIES, Choice, LeftOut, in_words, look_of, matches
-from .linked import linked
 from .notes import CHANGED, LEFT_OUT, SPECK, UNIT, Note
 from .outlines import ROUNDING, ring_area, ring_width
 from .unfilled import walls_to_fill
@@ -408,7 +407,7 @@ def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, Le
     near = 2e-3 * frame.length / 4.0
     apart = max(near, 0.5 * float(np.sqrt(np.median(shapely.area(shapes[others])))))
     a, b = shapely.STRtree(shapes[others]).query(shapes[others], "dwithin", apart)
-    piece = linked(a, b, len(others))
+    piece = linked((a, b), len(others))
     area = np.bincount(piece, shapely.area(shapes[others]))
     main = int(np.argmax(area))
     if (piece == main).sum() < 0.5 * len(others):

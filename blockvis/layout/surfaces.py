@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .linked import linked, within_reach
+from solver.mechanics import linked
+
+from .linked import within_reach
 from .outlines import ROUNDING
 from .solids import Solid, outward, size_of
 
@@ -76,5 +78,5 @@ def turned_faces(edges: np.ndarray, edge: np.ndarray, face: np.ndarray) -> np.nd
     forward = edges[:, 0] < edges[:, 1]
     fits = forward[first] != forward[second]
     one, other = face[first], face[second]
-    label = linked(np.append(one, one + m), np.append(other + m * ~fits, other + m * fits), 2 * m)
+    label = linked((np.append(one, one + m), np.append(other + m * ~fits, other + m * fits)), 2 * m)
     return np.asarray(label[:m] > label[m:])

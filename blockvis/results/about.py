@@ -7,7 +7,6 @@ import math
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -94,11 +93,6 @@ def unit_and_phase(response: solver.Response, phase: int) -> str:
     return f"{unit_in(response, phase)}{in_phase(response, phase)}"
 
 
-def reaction_size(response: solver.Response, moment: bool) -> float:
-    """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
-    return response.total_weight * (response.assembly.block_size if moment else 1.0)
-
-
 def told_reaction(value: float, response: solver.Response, moment: bool) -> float:
     """Give a reaction [N, or N·m of a moment] as it is told: 0 where it is the rounding of none."""
     return value if abs(value) > rounding_of(response, moment) else 0.0
@@ -111,20 +105,23 @@ def rounding_of(response: solver.Response, moment: bool) -> float:
     return EXACT * response.total_weight * (extent if moment else 1.0)
 
 
-class Measured(Protocol):
-    """What runs over a parameter and is measured: a response, or the course of one to come."""
+@dataclass(frozen=True)
+class Course:
+    """What the increments of an analysis run over and what is measured along them."""
+
+    parameter: mechanics.Quantity
+    measured: mechanics.Quantity
+    settlements: tuple[solver.Settlement, ...] = ()  #: Along which they run, or after which they begin.
+    control: solver.ControlDisplacement | None = None  #: What drives the parameter where no settlement does.
 
     @property
-    def parameter(self) -> mechanics.Quantity:
-        """What its increments run over."""
+    def drivers(self) -> tuple[solver.Settlement | solver.ControlDisplacement, ...]:
+        """How far the parameter goes in each phase; empty where no limit is known."""
+        return phases_of(self) if self.control is None else (self.control,)
 
-    @property
-    def measured(self) -> mechanics.Quantity:
-        """What is measured along them."""
 
-    @property
-    def settlements(self) -> tuple[solver.Settlement, ...]:
-        """Along which it runs, or after which it begins."""
+#: What runs over a parameter and is measured, found or to come.
+Measured = solver.Response | Course
 
 
 def phases_of(course: Measured) -> tuple[solver.Settlement, ...]:

@@ -13,9 +13,8 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from scipy.spatial import ConvexHull
 
 import solver
-from blockvis.layout.linked import linked
 from blockvis.text import width_text
-from solver.mechanics import counted
+from solver.mechanics import counted, linked
 
 from .about import EXACT
 from .joint_faces import InitialJoints, initial_joints
@@ -185,7 +184,7 @@ def _groups(meeting: np.ndarray, members: np.ndarray) -> list[np.ndarray]:
     place[members] = np.arange(len(members))
     one, other = place[meeting]
     both = (one >= 0) & (other >= 0)
-    group = linked(one[both], other[both], len(members))
+    group = linked((one[both], other[both]), len(members))
     return [members[group == k] for k in range(int(group.max(initial=-1)) + 1)]
 
 

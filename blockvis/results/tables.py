@@ -16,7 +16,7 @@ import solver
 from blockvis.text import force_text, listed
 from solver import mechanics
 
-from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, mechanism_text, unit_in
+from .about import collapse_mechanism, collapse_phase, loss_of, mechanism_text, unit_in
 from .record import Record
 
 #: Measures of the certificate of an increment.
@@ -55,7 +55,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_phase": None if phase is None else phase + 1,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": before.unit if before else unit_in(response, in_phase),
-        "initial_reaction": initial_reaction(response),
+        "initial_reaction": finite(response.initial_reaction),
         "reaction_at_rest": finite(path[0].reaction) if path else None,
         "collapse_lost": collapse.lost if collapse else None,
         "collapse_reaction": collapse.reaction if collapse else None,
@@ -86,14 +86,6 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "inputs": record.inputs(),
         "case": record.case,
     }
-
-
-def initial_reaction(response: solver.Response) -> float | None:
-    """Find the least reaction before anything has moved; bounds of a pushover are not of its reaction."""
-    if not response.path:
-        return None
-    first = response.path[0]
-    return finite(least_reaction(first) if response.measured.is_force else first.reaction)
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.layout.linked import linked
 from blockvis.layout.outlines import TOUCHING
 from solver import mechanics
+from solver.mechanics import linked
 
 from .plan import planned
 
@@ -71,7 +71,7 @@ def _first_of(case: Case, assembly: solver.Assembly) -> tuple[solver.Increment |
 def _cause(case: Case, assembly: solver.Assembly, falling: Sequence[int]) -> str:
     """Say why blocks fall: they touch nothing that stands, they slide, or they tip."""
     contacts = mechanics.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
-    part = linked(contacts.block_a, contacts.block_b, assembly.n_blocks)
+    part = linked((contacts.block_a, contacts.block_b), assembly.n_blocks)
     loose = np.flatnonzero(assembly.free & ~np.isin(part, part[~assembly.free]))
     if len(loose):
         others = "; the others fall for another reason, told once these stand" if set(falling) - set(loose) else ""

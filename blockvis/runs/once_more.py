@@ -25,9 +25,6 @@ from .plan import planned
 #: the same where no corner is farther off, in block sizes.
 SAME = 1e-9
 
-#: The way to find increments that has no steps of its own.
-LINEAR_PROGRAM = mechanics.INCREMENTS[1]
-
 
 @dataclass(frozen=True)
 class Traced:
@@ -99,7 +96,7 @@ def _answer(say: Say, word: str, about: Any) -> bool:
 
 def takes_steps(case: Case) -> bool:
     """Whether a case follows a path in steps that choose themselves: a linear program per increment has none."""
-    return case.controls.increments != LINEAR_PROGRAM and KINDS[case.analysis].course(case).parameter.is_path
+    return case.controls.increments != mechanics.LINEAR_PROGRAM and KINDS[case.analysis].course(case).parameter.is_path
 
 
 def traced(response: solver.Response) -> Traced:

@@ -59,7 +59,7 @@ def refuse_ties(case: Case) -> None:
     """Raise ValueError for ties that an analysis does not know, or before a settlement that there is not."""
     for tie in case.ties:
         who = f"{tie.where} '{tie.name}'"
-        if case.controls.increments == mechanics.INCREMENTS[1]:
+        if case.controls.increments == mechanics.LINEAR_PROGRAM:
             raise ValueError(
                 f'{who}: increments = "{case.controls.increments}" knows no ties; leave increments out, or [[ties]]'
             )

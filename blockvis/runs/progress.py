@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 import solver
-from blockvis.kinds.kind import Course
+from blockvis.results.about import Course
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -109,7 +109,7 @@ class Progress:
                     what = f"increment {self.count + 1}" if state is None else f"{self.doing(state)}, in one step"
                     self._line.write(f"{what} for {still:.0f} s")
 
-    def _driver(self, phase: int) -> mechanics.Control | None:
+    def _driver(self, phase: int) -> solver.Settlement | solver.ControlDisplacement | None:
         drivers = self.course.drivers
         return drivers[min(phase, len(drivers) - 1)] if drivers else None
 

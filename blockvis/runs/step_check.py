@@ -18,7 +18,7 @@ from blockvis.results.record import read_json, write_json
 from blockvis.system.worker import LOOK
 from solver import mechanics
 
-from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
+from .once_more import OnceMore, Traced, followed, takes_steps, traced
 from .reopen import case_of, open_results
 
 #: Step tolerance of the other path over that of the run. Half of it is near by chance too often.
@@ -160,7 +160,7 @@ def check_steps(folder: str | Path) -> StepCheck:
     folder = Path(folder)
     case, response = stored_case(folder), open_results(folder)
     if not (takes_steps(case) and response.path):
-        by = ", by linear program" if case.controls.increments == LINEAR_PROGRAM else ""
+        by = ", by linear program" if case.controls.increments == mechanics.LINEAR_PROGRAM else ""
         raise ValueError(
             f"'{folder}' has no path whose steps could be checked ({response.analysis}, {len(response.path)} "
             f"increments{by}); it takes a settlement or a pushover"

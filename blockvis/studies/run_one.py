@@ -25,7 +25,7 @@ from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import collapse_phase, governing_limit, loss_in, phases_of
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.mechanism_arrays import SWING, swing_factors
-from blockvis.results.tables import initial_reaction
+from blockvis.results.tables import finite
 from blockvis.runs.plan import planned
 from solver import mechanics
 
@@ -142,7 +142,7 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         "last_settlement": float(path[-1].settlement + before[path[-1].phase])
         if path and response.parameter.is_path
         else 0.0,
-        "initial_reaction": initial_reaction(response),
+        "initial_reaction": finite(response.initial_reaction),
         "collapse_reaction": None,
         "load_multiplier": None,
         "total_weight": response.total_weight,

@@ -11,9 +11,9 @@ import numpy as np
 from solver.assembly import Assembly, check_blocks
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose
-from solver.loads import Loads
+from solver.loads import ControlDisplacement, Loads
 from solver.path.controls import LINEAR_PROGRAM, Controls
-from solver.path.drivers import ControlDisplacement, ControlledLoad
+from solver.path.drivers import ControlledLoad
 from solver.path.local_origin import at_origin, in_global_coordinates, without_origin
 from solver.path.path import Path
 from solver.path.state import PathState

@@ -46,10 +46,10 @@ def at_largest(values: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:
     return [given[there] for given in (values, *others)]
 
 
-def linked(pairs: np.ndarray, n: int) -> np.ndarray:
-    """(n,) int array: number of the group of each of n items that pairs of them, (2, n_pairs) int, link."""
+def linked(pairs: np.ndarray | tuple[np.ndarray, np.ndarray], n: int) -> np.ndarray:
+    """(n,) int array: group of each of n items that pairs, (2, n_pairs) int, link; numbered by their first members."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    links = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(n, n))
+    links = coo_array((np.ones(len(pairs[0])), tuple(pairs)), shape=(n, n))
     return np.asarray(connected_components(links, directed=False)[1])

@@ -17,9 +17,7 @@ GRAIN = 2.0**-29
 
 def feature_rows(kind: int, first: np.ndarray, second: np.ndarray, rest: np.ndarray | int) -> np.ndarray:
     """(n, 4) int array: features of one kind."""
-    rows = np.empty((len(first), 4), dtype=np.int64)
-    rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3] = kind, first, second, rest
-    return rows
+    return np.stack(np.broadcast_arrays(kind, first, second, rest), axis=1)
 
 
 def places_of(along_a: np.ndarray, along_b: np.ndarray, parallel: np.ndarray | bool = False) -> np.ndarray:

@@ -10,7 +10,7 @@ from solver.results.response import Collapse
 from solver.words import make_plain
 
 #: Methods to find increments: the path of Coulomb friction, or the linear programs of the paper.
-COULOMB, LINEAR_PROGRAM = INCREMENTS = ("coulomb", "linear program")
+COULOMB, LINEAR_PROGRAM = "coulomb", "linear program"
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Controls:
     def __post_init__(self) -> None:
         """Refuse an unknown method, and numbers out of their range."""
         make_plain(self)
-        if self.increments not in (None, *INCREMENTS):
+        if self.increments not in (None, COULOMB, LINEAR_PROGRAM):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
         for name, fits, wanted in (
             ("falling_frames", self.falling_frames >= 0, "of at least 0, by default 10"),

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from solver import tolerances
 from solver.assembly import Assembly, find_contacts
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_matrices
-from solver.loads import Settlement, check_fits, check_steps, set_vectors
+from solver.loads import ControlDisplacement, Settlement
 from solver.program.model import Model
-from solver.words import make_plain
 
 
-class Driver(ABC):
+class Driver:
     """The parameter of a path: what it moves, how far, and in which increments, from a pose."""
 
     #: Name of the parameter.
@@ -42,13 +39,13 @@ class Driver(ABC):
         stop = min([multiple, *(stop for stop in self.stops if stop > s + near)])
         return self.limit if self.limit - stop < near else stop
 
-    @abstractmethod
     def supports(self, s: float) -> Pose:
-        """Pose of the supports; that of free blocks has no meaning."""
+        """Pose of the supports, by default as at the start; that of free blocks has no meaning."""
+        return self.start
 
-    @abstractmethod
     def rate(self, s: float) -> np.ndarray:
-        """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
+        """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter, by default zero."""
+        return np.zeros((self.assembly.n_blocks, self.start.positions.shape[1] + self.start.rotations.shape[1]))
 
     def lever(self, model: Model) -> float:
         """Largest displacement that it prescribes, per unit of it."""
@@ -99,47 +96,6 @@ class SupportMotion(Driver):
         return self.phase.rate(self.assembly, self.start, s)
 
 
-@dataclass(frozen=True)
-class ControlDisplacement:
-    """The control displacement of a pushover analysis.
-
-    Attributes
-    ----------
-    block : str
-        Name of a free block.
-    direction : (d,) sequence, optional
-        Direction in which the displacement counts; only its direction matters. Along x by default.
-    point : (d,) sequence, optional [m]
-        A point of the block, in the drawing; its centroid by default.
-    increment : float [m]
-        Largest step.
-    limit : float [m]
-        Largest control displacement.
-    tolerance : float, optional [m]
-        Width of the bracket of the displacement at the end; a hundredth of the increment by default.
-    """
-
-    block: str
-    direction: Sequence[float] | None = None
-    point: Sequence[float] | None = None
-    increment: float = 0.01
-    limit: float = 1.0
-    tolerance: float | None = None
-    #: Of the control displacement.
-    unit: ClassVar[str] = "m"
-
-    def __post_init__(self) -> None:
-        """Check the numbers; the direction becomes a unit vector."""
-        make_plain(self)
-        units = {"direction": "direction in which the displacement counts"}
-        set_vectors(self, "control", {"direction": (2, 3), "point": (2, 3)}, units)
-        check_steps(self, "control")
-
-    def check_dimension(self, assembly: Assembly) -> None:
-        """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
-        check_fits(assembly, "control", {"direction": self.direction, "point": self.point})
-
-
 class ControlledLoad(Driver):
     """A live load whose multiplier makes a control displacement grow; all supports are fixed."""
 
@@ -156,14 +112,6 @@ class ControlledLoad(Driver):
             f"the mechanism does not move block '{chosen.block}' along {chosen.direction or 'x'}; turn the "
             "direction round if it moves it the other way, or choose another control block, point or direction"
         )
-
-    def supports(self, s: float) -> Pose:
-        """As at the start."""
-        return self.start
-
-    def rate(self, s: float) -> np.ndarray:
-        """Zero."""
-        return np.zeros((self.assembly.n_blocks, self.start.positions.shape[1] + self.start.rotations.shape[1]))
 
     def control_displacement(self, pose: Pose) -> float:
         """Since the start [m]."""

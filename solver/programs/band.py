@@ -234,13 +234,13 @@ def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
     wide = np.flatnonzero(np.diff(program.matrix.indptr) > WIDE)
     try:
         with one_thread(), np.errstate(divide="raise", over="raise", invalid="raise"):
-            x, y, iterations = _solved_in_pieces(program, wide) if len(wide) else _solved(program)
+            x, y = _solved_in_pieces(program, wide) if len(wide) else _solved(program)
     except (NoProgress, FloatingPointError) as reason:
         return None, str(reason)
-    return program.checked(x, y, "band", iterations), "solved"
+    return program.checked(x, y, "band"), "solved"
 
 
-def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
     rows, columns = program.matrix.shape
     narrow = np.delete(np.arange(columns), wide)
@@ -271,14 +271,14 @@ def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndar
         return joined
 
     try:
-        solution, row_dual, iterations = _solved(unfolded)
+        solution, row_dual = _solved(unfolded)
     except Unbounded as ray:
         program.raise_if_unbounded(folded(ray.x))
         raise NoProgress("a ray of the pieces is none of the program") from None
-    return folded(solution), row_dual[:rows], iterations
+    return folded(solution), row_dual[:rows]
 
 
-def _solved(program: LinearProgram) -> tuple[np.ndarray, np.ndarray, int]:
+def _solved(program: LinearProgram) -> tuple[np.ndarray, np.ndarray]:
     method = _Method(program)
     least, best, least_at = math.inf, method.point, 0
     for iteration in range(ITERATIONS):
@@ -287,7 +287,7 @@ def _solved(program: LinearProgram) -> tuple[np.ndarray, np.ndarray, int]:
         if error < least:
             least, best, least_at = error, method.point, iteration
         if error < INTERIOR_TOLERANCE or (least < ACCEPTED_ERROR / 2.0 and iteration - least_at >= 5):
-            return best.primal[method.x], best.row_dual, iteration
+            return best.primal[method.x], best.row_dual
         method.iterate(residuals)
         if iteration % 5 == 0:
             method.check_ray()

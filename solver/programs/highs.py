@@ -73,9 +73,6 @@ def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]
     solution = highs.getSolution()
     if not (solution.value_valid and solution.dual_valid):
         return None, status
-    info = highs.getInfo()
-    iterations = max(info.simplex_iteration_count, 0) + max(info.ipm_iteration_count, 0)
     # Interior solutions are negative by up to their tolerance; the rows show what that gains.
     x = np.maximum(np.asarray(solution.col_value), 0.0)
-    y = np.asarray(solution.row_dual)
-    return program.checked(x, y, route, int(iterations)), status
+    return program.checked(x, np.asarray(solution.row_dual), route), status

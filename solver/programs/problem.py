@@ -38,14 +38,14 @@ class LinearProgram:
     upper: np.ndarray
     places: np.ndarray | None = None  #: (m, dim): where the row's block is
 
-    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
+    def checked(self, x: np.ndarray, y: np.ndarray, route: str) -> Solution:
         """Measure a solution x with multipliers y of the rows by the program alone; violations are absolute."""
         activity = self.matrix @ x
         bound = float(np.where(y > 0, y * self.lower, y * self.upper).sum())
         violation = float(np.maximum(self.lower - activity, activity - self.upper).max(initial=0.0))
         violation = max(violation, float(-x.min(initial=0.0)))
         of_dual = float(-(self.cost - self.matrix.T @ y).min(initial=0.0))
-        return Solution(x, y, float(self.cost @ x), bound, violation, of_dual, route, iterations)
+        return Solution(x, y, float(self.cost @ x), bound, violation, of_dual, route)
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
         """Raise ``Unbounded`` where the ray, (n,), passes our own check."""
@@ -99,13 +99,13 @@ class ConicProgram:
         excess /= np.hypot(1.0, self.friction)
         return max(float(excess.max(initial=0.0)), float(-reduced[self.in_cones :].min(initial=0.0)))
 
-    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
+    def checked(self, x: np.ndarray, y: np.ndarray, route: str) -> Solution:
         """Measure a solution by the program alone; violations are relative to 1 + the largest number of their kind."""
         of_right, of_x, of_y = (1.0 + float(np.abs(kind).max(initial=0.0)) for kind in (self.right, x, y))
         violation = float(np.abs(self.matrix @ x - self.right).max(initial=0.0))
         violation = max(violation / of_right, self.outside(x) / of_x)
         of_dual = self.outside_dual(self.cost - self.matrix.T @ y) / of_y
-        return Solution(x, y, float(self.cost @ x), float(self.right @ y), violation, of_dual, route, iterations)
+        return Solution(x, y, float(self.cost @ x), float(self.right @ y), violation, of_dual, route)
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
         """Raise ``Unbounded`` where the ray, (n,), passes our own check."""
@@ -138,7 +138,6 @@ class Solution:
     primal_violation: float  #: largest of a row, of a cone or of x ≥ 0
     dual_violation: float  #: how far the reduced costs leave the dual cones or go below 0 at most
     route: str
-    iterations: int
 
     @property
     def gap(self) -> float:

@@ -6,14 +6,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from solver.assembly import Assembly
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, moved_vertices
-from solver.loads import GRAVITY, Loads, Settlement
+from solver.loads import GRAVITY, ControlDisplacement, Loads, Settlement
 from solver.phases import PhaseChange, loads_in
 from solver.ties import Tie
 from solver.tolerances import AT_LIMIT, DRAWN_GAP
@@ -88,18 +88,6 @@ class LocalLoss:
     phase: int = 0
 
 
-class Control(Protocol):
-    """What drives an analysis that no settlement drives: how far it goes, and in which unit."""
-
-    @property
-    def limit(self) -> float:
-        """Where to stop."""
-
-    @property
-    def unit(self) -> str:
-        """Of the limit."""
-
-
 @dataclass(frozen=True, eq=False)
 class Response(Shown):
     """A whole analysis.
@@ -127,8 +115,8 @@ class Response(Shown):
         What the increments run over, in the unit of the first settlement; others have their own, ``Settlement.unit``.
     measured : Quantity
         What is measured along them, with the unit that belongs to it.
-    control : optional
-        What drives the parameter where no settlement does: the ControlDisplacement of a pushover.
+    control : ControlDisplacement, optional
+        What drives the parameter where no settlement does.
     ties : tuple of Tie
     changes : tuple of PhaseChange
         Of blocks and dead loads between the settlements.
@@ -146,7 +134,7 @@ class Response(Shown):
     limits: tuple[LimitLoad, ...] = ()
     parameter: Quantity = SETTLEMENT
     measured: Quantity = REACTION
-    control: Control | None = None
+    control: ControlDisplacement | None = None
     ties: tuple[Tie, ...] = ()
     changes: tuple[PhaseChange, ...] = ()
 

@@ -80,6 +80,8 @@ def test_limit_load_of_a_mesh():
     found = mesh.blockvis.limit_load(friction_coefficient=2.0)
     assert found.multiplier == pytest.approx(0.5, rel=1e-6)
     assert mesh.blockvis.limit_load(friction_coefficient=0.3).multiplier == pytest.approx(0.3, rel=1e-6)
+    with pytest.raises(TypeError, match="give one of them"):
+        mesh.blockvis.limit_load(friction_coefficient=0.3, interfaces=solver.Interfaces(solver.InterfaceLaw()))
 
 
 def test_cubes_are_blocks_alone_and_together():

@@ -15,8 +15,9 @@ import shapely
 from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from blockvis.layout.left_out import LeftOut
-from blockvis.layout.linked import linked, middles
+from blockvis.layout.linked import middles
 from blockvis.layout.outlines import largest_piece, ring_of
+from solver.mechanics import linked
 
 from .facing_edges import common_width, edges_of
 
@@ -247,7 +248,7 @@ def without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndar
     # Where shrinking would fold an outline, less of it is done.
     for _ in range(4):
         a, b = ends[length < limit].T
-        group = linked(a, b, len(corners))
+        group = linked((a, b), len(corners))
         # Of two that stay, none may go to the other.
         torn = np.bincount(group, staying)[group] > 1
         group[torn] = group.max() + 1 + np.arange(np.count_nonzero(torn))
