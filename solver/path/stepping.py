@@ -45,7 +45,7 @@ LINEARISATIONS = 6
 EXACT_SLIDING, EXACT = 1e-6, 1e-8
 
 #: Change of the load of a fill that has followed the blocks, in block weights, up to which a step is not repeated.
-SAME_LOAD = 1e-6
+SAME_LOAD = 1e-5
 
 #: Penetration, in block sizes, from which on a step is repeated with the points that it missed, and gap up to which
 #: blocks touch as drawn.
