@@ -13,8 +13,8 @@ from solver import mechanics
 #: 16 degrees as of a drum of 24 sides, and would hide the joints.
 SMOOTH = 0.961
 
-#: Distance from a plane, in sizes of the structure, at which a point lies in it.
-IN_PLANE = 1e-9
+#: Distance from a plane, in sizes of the structure, at which a point lies in it: blocks that touch are as far apart.
+IN_PLANE = 1e-7
 
 
 def triangles_of(shapes: mechanics.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
@@ -66,7 +66,7 @@ def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
 def left_blocks(assembly: solver.Assembly, heights: np.ndarray) -> np.ndarray:
     """(n_blocks,) bool array: blocks with corners, at heights (n_vertices,) [m] over a plane, above it.
 
-    To rounding: what ends in the plane has a face there and nothing above.
+    What ends in the plane has a face there and nothing above.
     """
     inside = heights > IN_PLANE * float(np.ptp(assembly.vertices, axis=0).max())
     return np.bincount(assembly.block_of_vertex, inside, assembly.n_blocks) > 0
@@ -84,7 +84,7 @@ def section_of(
     u /= np.linalg.norm(u)
     v = np.cross(normal, u)
     height = (corners - point) @ normal
-    # A corner that lies in the plane, to rounding, belongs to its lower side: every triangle has none or two edges
+    # A corner that lies in the plane belongs to its lower side: every triangle has none or two edges
     # across, and a block above, which is kept, is closed where its face lies in the plane.
     near = IN_PLANE * float(np.ptp(corners, axis=0).max())
     height = np.where(np.abs(height) <= near, -near, height)
