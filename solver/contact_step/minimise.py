@@ -62,7 +62,8 @@ def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float)
             return StepSolution(motion, forces, trial, multiplier, imbalance, abs(missing))
         before, status = status, problem.status(trial)
         changed = int((status != before).sum())
-        if not imbalance < np.inf or changed > MOST_CHANGED * len(status):
+        # As many as there are factorisations may follow one after another.
+        if not imbalance < np.inf or changed > max(MOST_CHANGED * len(status), NEWTON_FACTORISATIONS):
             break
         # Where no point has changed, the factors serve once more.
         is_new = not is_new or changed > 0

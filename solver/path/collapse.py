@@ -158,19 +158,17 @@ class Fall:
             return
         # Where something is taken away at once the joints of what stays spring back first.
         place = self.relax(place, SPRUNG_BACK)[0] if at_once else place
-        steps = self.time_steps(place, 2.0 * MECHANISM)
-        for number in range(max(self.n_frames, 1)):
+        for largest in (2.0 * MECHANISM, *[0.2] * max(self.n_frames - 1, 0)):
             start, total, ends = place, np.zeros_like(self.model.load), False
-            for moved, motion, _, _ in steps:
+            for moved, motion, _, _ in self.time_steps(start, largest):
                 place, total = moved, total + motion
                 # The first one shows the mechanism once joints have moved by more than they give.
-                ends = np.abs(total).max() > 0.1 or (number == 0 and self._parted(start, total) > MECHANISM)
+                ends = np.abs(total).max() > 0.1 or (largest < 0.1 and self._parted(start, total) > MECHANISM)
                 if ends:
                     break
             yield self.reports.falling_increment(start, total * self.model.lengths)
             if not ends:
                 return
-            steps = self.time_steps(place, 0.2) if number == 0 else steps
 
     def _parted(self, start: Place, motion: np.ndarray) -> float:
         """How far a motion, (n_blocks, n_dof), parts the blocks of a joint at most, in block sizes."""
