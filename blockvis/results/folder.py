@@ -137,7 +137,7 @@ class ResultsFolder:
         self._files = StoredIncrements(self.path)
         refuse_results(path, overwrite)
         make_folder(self.path / "increments")
-        self._release = locked(self, self.path)
+        self.release = locked(self, self.path)
         # Lists of files go first, so that none ever names a file that is gone.
         for name in (*_LISTS, *_PICTURES, *_STARTED):
             (self.path / name).unlink(missing_ok=True)
@@ -160,7 +160,7 @@ class ResultsFolder:
         results.path, results.parameter, results.vtu = Path(path), parameter, vtu
         results.record = read_record(results.path)
         results.assembly = stored_assembly(results.path)
-        results._release = locked(results, results.path)
+        results.release = locked(results, results.path)
         results._files = StoredIncrements(results.path)
         results.increments, checkpoint, count = [], None, 0
         stored = results.path / CHECKPOINT
@@ -231,7 +231,7 @@ class ResultsFolder:
             listed["ties"] = [asdict(course) for course in courses]
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_json(self.path / "summary.json", summary)
-        self._release()
+        self.release()
         return summary
 
     def tell(self, response: solver.Response) -> None:

@@ -252,6 +252,9 @@ def _writing(results: ResultsFolder, outputs: Sequence[Drawing]) -> Iterator[Non
             # They may have half-written files, too.
             output.close()
         raise _write_error(results.path, error) from None
+    finally:
+        # The frames of an error may hold the results for long.
+        results.release()
 
 
 def _followed(
