@@ -290,7 +290,7 @@ def test_a_run_holds_its_folder(windows, locks, tmp_path):
     first = ResultsFolder(tmp_path / "out", assembly)
     with pytest.raises(ResultsExist, match=r"another run is writing"):
         ResultsFolder(tmp_path / "out", assembly, overwrite=True)
-    first._release()
+    first.release()
     ResultsFolder(tmp_path / "out", assembly, overwrite=True)
 
 
