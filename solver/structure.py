@@ -27,9 +27,6 @@ from .results.response import Envelope, LimitLoad, Response
 from .ties import Tie, TieForces
 from .views import Shown
 
-#: Friction coefficient of joints of which nothing is said.
-USUAL = InterfaceLaw.friction_coefficient
-
 
 @dataclass(frozen=True, init=False, eq=False)
 class Structure(Shown):
@@ -69,7 +66,7 @@ class Structure(Shown):
         friction_coefficient: float | None = None,
         ties: Sequence[Tie] = (),
     ) -> None:
-        interfaces = _laws(interfaces, friction_coefficient)
+        interfaces = _laws(interfaces, friction_coefficient, usual=None)
         interfaces.check(checked(assembly, Assembly, "assembly"))
         loads, ties = checked_loads(assembly, loads), tuple(checked(tie, Tie, "one of the ties") for tie in ties)
         vars(self).update(assembly=assembly, interfaces=interfaces, loads=loads, ties=ties)
@@ -301,7 +298,9 @@ class Structure(Shown):
         return Response(increments=found, **vars(self), **vars(increments.ending), **analysed)
 
 
-def _laws(interfaces: Interfaces | None, friction: Any, usual: float | None = None) -> Interfaces:
+def _laws(
+    interfaces: Interfaces | None, friction: Any, usual: float | None = InterfaceLaw.friction_coefficient
+) -> Interfaces:
     """Return the laws of all interfaces, given as such or by a friction coefficient; warns of one that is an angle."""
     if (interfaces is None and friction is usual is None) or (interfaces is not None and friction != usual):
         raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
@@ -334,7 +333,7 @@ def settle(
     assembly: Assembly,
     settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray,
     *,
-    friction_coefficient: float = USUAL,
+    friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     loads: Loads | None = None,
     **options: Any,
@@ -343,7 +342,7 @@ def settle(
 
     The friction coefficient is of every interface; another than 0.6 beside ``interfaces`` is refused.
     """
-    return Structure(assembly, _laws(interfaces, friction_coefficient, USUAL), loads).settle(settlement, **options)
+    return Structure(assembly, _laws(interfaces, friction_coefficient), loads).settle(settlement, **options)
 
 
 def pushover(
@@ -351,21 +350,21 @@ def pushover(
     control: ControlDisplacement,
     *,
     loads: Loads | None = None,
-    friction_coefficient: float = USUAL,
+    friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     **options: Any,
 ) -> Response:
     """Follow blocks under growing displacement: :meth:`Structure.pushover`, with its options, in one call."""
-    return Structure(assembly, _laws(interfaces, friction_coefficient, USUAL), loads).pushover(control, **options)
+    return Structure(assembly, _laws(interfaces, friction_coefficient), loads).pushover(control, **options)
 
 
 def limit_load(
     assembly: Assembly,
     *,
     loads: Loads | None = None,
-    friction_coefficient: float = USUAL,
+    friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     **options: Any,
 ) -> LimitLoad:
     """Find the largest multiplier of live loads: :meth:`Structure.limit_load`, with its options, in one call."""
-    return Structure(assembly, _laws(interfaces, friction_coefficient, USUAL), loads).limit_load(**options)
+    return Structure(assembly, _laws(interfaces, friction_coefficient), loads).limit_load(**options)
