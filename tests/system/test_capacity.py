@@ -524,7 +524,7 @@ def test_a_pushover_says_which_settlement_it_comes_after(tmp_path):
 
 
 @pytest.mark.path
-@pytest.mark.parametrize("block", ["pier", "pinnacle"])
+@pytest.mark.parametrize("block", ["pier", pytest.param("pinnacle", marks=pytest.mark.thorough)])
 def test_a_control_beside_what_topples_is_told(block, tmp_path, capsys):
     """The capacity of the pinnacle was lost at a displacement of the pier, which stands, without a word."""
     two = solver.Assembly.from_outlines(

@@ -332,6 +332,7 @@ def test_an_output_that_is_full_is_named(case, words, buffer):
     assert (done.returncode, done.stderr) == (2, said)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names, or no such pipes")
 def test_a_case_that_comes_through_a_pipe_is_run_and_drawn(tmp_path, capsys):
     end, begin = os.pipe()

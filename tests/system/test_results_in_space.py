@@ -550,6 +550,7 @@ def torn(assembly, swing):
     return np.linalg.norm(a - b, axis=1).max()
 
 
+@pytest.mark.thorough
 def test_a_mechanism_swings_as_far_on_the_page_as_if_its_hinges_might_part(tmp_path, monkeypatch):
     """Where the analysis of the fall ends at once: 1.2 times as far as goes with its arrows."""
     motions, response = [], vault_response()

@@ -115,6 +115,7 @@ def test_what_does_not_fit_is_named(text, reason, tmp_path):
         assembly_of(case(text, tmp_path))
 
 
+@pytest.mark.thorough
 def test_a_support_in_space_moves_as_its_six_numbers_say(tmp_path):
     text = (
         DOME + '[settlement]\nincrement = 1e-3\nlimit = 1e-3\nprofile.supports."springer 1" = [0, 2, -2, 0, 0, 0.5]\n'

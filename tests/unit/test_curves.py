@@ -59,6 +59,7 @@ def said(response, path):
     return re.findall(r"<!-- (.*?) -->", draw_curve(response, path).read_text(encoding="utf-8"))
 
 
+@pytest.mark.thorough
 def test_the_curve_names_the_failure_of_a_run(tmp_path):
     response = arch_response()
     failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path[:4])

@@ -38,7 +38,7 @@ def test_of_small_walls(bricks, courses, seed):
     assert error_of(rows_of(generators.wall(bricks=bricks, courses=courses)), seed) < 1e-10
 
 
-@pytest.mark.parametrize("with_places", [True, False])
+@pytest.mark.parametrize("with_places", [True, pytest.param(False, marks=pytest.mark.thorough)])
 def test_of_a_dome_of_wide_rings(with_places):
     """A band of 480 rows and more: by fronts."""
     rows = rows_of(generators.dome(lunes=80, courses=4), with_places=with_places)

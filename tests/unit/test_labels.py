@@ -75,6 +75,7 @@ def test_a_frame_between_two_results_has_its_place_on_the_curve(words):
     np.testing.assert_allclose(values, expected, atol=1e-4)
 
 
+@pytest.mark.thorough
 def test_every_picture_of_a_failed_run_has_a_badge(words):
     response = arch_response()
     failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path)

@@ -52,6 +52,7 @@ def test_cells_that_are_no_one_piece_are_refused(tmp_path, cells, words):
         rings_of(tmp_path, cells)
 
 
+@pytest.mark.thorough
 def test_a_long_row_of_collinear_points_is_one_edge(tmp_path):
     n = 50_000
     ring = np.vstack([np.column_stack([np.linspace(0, 1, n), np.zeros(n)]), [[1, 1], [0, 1]]])

@@ -70,6 +70,7 @@ def test_a_support_that_is_taken_away_weighs_nothing_in_note_and_summary(tmp_pat
     assert any("block 'prop' taken away before settlement 2, 0 N" in note for note in summary["notes"])
 
 
+@pytest.mark.thorough
 def test_what_changes_before_a_settlement_is_told_where_the_structure_falls_of_it() -> None:
     """A tie goes, and a load pushes the load off: report and command line named neither."""
     structure = beam_on_a_prop()

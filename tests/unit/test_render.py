@@ -314,6 +314,7 @@ def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, words):
     assert '"loads":[["live","liveload\\u00b7\\u03b1",' in report
 
 
+@pytest.mark.thorough
 def test_what_does_not_stand_before_its_limit_load_is_told_as_that(tmp_path, words):
     solids = [box((-1, -1, -0.4), (1, 1, 0)), box((0.9, -0.2, 0), (1.3, 0.2, 1))]
     leaning = solver.Assembly.from_solids(solids, roles=["fixed", "free"])

@@ -233,6 +233,7 @@ def test_on_the_command_line(tmp_path, capsys):
     assert read_layout(tmp_path / "a.json").n_blocks == 16
 
 
+@pytest.mark.thorough
 def test_info_honours_roles_of_layers_and_draws_what_was_left_out(tmp_path):
     path = drawn(
         tmp_path,

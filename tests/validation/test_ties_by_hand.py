@@ -83,6 +83,7 @@ def test_a_rope_that_has_yielded_is_as_long_as_it_gave_when_it_is_loaded_again()
     assert again.ties.forces[0] == pytest.approx(600.0, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_prestress_is_there_from_the_start_and_a_prop_carries_no_tension():
     assert _settled(_hung(prestress=200.0)).reaction[0] == pytest.approx(800.0, rel=1e-4)
     np.testing.assert_allclose(_settled(_hung(kind="prop")).reaction, 1000.0, rtol=1e-6)
