@@ -8,9 +8,9 @@ from .factors import Solve
 from .interior import ACCEPTED, BALANCED, interior_point
 from .problem import ContactProblem, NotSolved, StepSolution
 
-#: Factorisations of Newton's method, and force out of balance, in block weights, were the blocks to go on as before or
-#: after the first one, that foretells more: the interior method, which takes 8 to 14 wherever it starts, takes over.
-NEWTON_FACTORISATIONS, NEAR = 12, 20.0
+#: Factorisations of Newton's method, and part of the contact points that begin or cease to push or to slide in one of
+#: its steps, which foretells more: the interior method, which takes 8 to 14 wherever it starts, takes over.
+NEWTON_FACTORISATIONS, MOST_CHANGED = 12, 0.15
 
 #: Slopes of the program along a step of Newton's method that are computed at most.
 SEARCHES = 20
@@ -39,8 +39,6 @@ def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float)
     """Semismooth Newton steps from trial forces: the solution, None where they lead too far."""
     motion = np.zeros_like(problem.load)
     start, from_start = problem.trial(motion), trial is None
-    if not from_start and np.abs(problem.unbalanced(motion, problem.projected(start), multiplier)).max() > NEAR:
-        return None
     # The first linear problem is that of the given trial forces, at the start.
     trial = start if trial is None else trial
     stiffness = problem.stiffness(trial)
@@ -62,11 +60,14 @@ def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float)
         imbalance = float(np.abs(unbalanced).max())
         if imbalance < BALANCED * max(1.0, abs(multiplier)) and abs(missing) <= 1e-12 + BALANCED * problem.size:
             return StepSolution(motion, forces, trial, multiplier, imbalance, abs(missing))
-        if not (imbalance <= NEAR or (from_start and imbalance < np.inf)):
-            break
         before, status = status, problem.status(trial)
+        changed = int((status != before).sum())
+        # As many as there are factorisations may follow one after another, where each step is searched along.
+        few = 0 if problem.live is not None else NEWTON_FACTORISATIONS
+        if not imbalance < np.inf or changed > max(MOST_CHANGED * len(status), few):
+            break
         # Where no point has changed, the factors serve once more.
-        is_new = not is_new or bool((status != before).any())
+        is_new = not is_new or changed > 0
     return None
 
 
