@@ -10,7 +10,7 @@ from .problem import ContactProblem, NotSolved, StepSolution
 
 #: Factorisations of Newton's method, and part of the contact points that begin or cease to push or to slide in one of
 #: its steps, which foretells more: the interior method, which takes 8 to 14 wherever it starts, takes over.
-NEWTON_FACTORISATIONS, MOST_CHANGED = 12, 0.15
+NEWTON_FACTORISATIONS, MOST_CHANGED = 12, 0.08
 
 #: Slopes of the program along a step of Newton's method that are computed at most.
 SEARCHES = 20
