@@ -73,6 +73,7 @@ class Crack:
     #: (2, d) array [m]: where it begins and ends in the layout, the lower first; in space its two corners that are
     #: farthest apart.
     ends: np.ndarray
+    along: np.ndarray  #: (d,) array: from end to end; in space the steepest way up the crack as a whole.
     size: float  #: Length [m] of all its joints together, in space their area [m²].
     #: (n,) array: opening [m] of each of its joints times its length [m], in space its area [m²].
     areas: np.ndarray
@@ -86,9 +87,9 @@ class Crack:
 
     @property
     def inclination(self) -> float:
-        """Of the line between its ends: counter-clockwise from the horizontal to 180, in space to 90 [degrees]."""
-        *level, rise = self.ends[1] - self.ends[0]
-        angle = np.arctan2(rise, level[0]) if len(level) == 1 else np.arctan2(abs(rise), np.hypot(*level))
+        """From the horizontal [degrees]: counter-clockwise to 180, in space to 90."""
+        *level, rise = self.along
+        angle = np.arctan2(rise, level[0] if len(level) == 1 else np.hypot(*level))
         return float(np.degrees(angle) % 180.0)
 
     def values(self) -> dict[str, Any]:
@@ -121,8 +122,9 @@ def cracks_of(assembly: solver.Assembly, pose: solver.Pose, fallen: np.ndarray |
     chosen = np.flatnonzero((moved[:, 0] > least) | (np.abs(moved[:, 1]) > least))
     meeting = _meetings(joints, chosen, MEETING * assembly.block_size)
     if assembly.dimension == 3:
-        meeting = meeting[:, _part_alike(carried_faces(assembly, joints, pose), joints, chosen[meeting])]
-        found = [_crack(assembly, joints, moved, chosen[group]) for group in _groups(meeting, np.arange(len(chosen)))]
+        apart = _apart(carried_faces(assembly, joints, pose), joints)
+        groups = _groups(meeting[:, _part_alike(*apart[chosen[meeting]])], np.arange(len(chosen)))
+        found = [_crack(assembly, joints, moved, chosen[group], apart=apart) for group in groups]
     else:
         courses = _courses(joints, moved[chosen], chosen, meeting, assembly.block_size)
         open_ones = [course for course in courses if moved[course, 0].max() > least]
@@ -297,6 +299,7 @@ def _crack(
     moved: np.ndarray,
     chosen: np.ndarray,
     places: Places | None = None,
+    apart: np.ndarray | None = None,
 ) -> Crack:
     rings = joints.rings
     # A course in the plane is in order; a joint beside its way, where three meet, is not where it ends.
@@ -305,7 +308,12 @@ def _crack(
     chosen = chosen[np.argsort(-moved[chosen, 0], kind="stable")]
     widest = chosen[0]
     a, b = (assembly.names[int(of[widest])] for of in (joints.block_a, joints.block_b))
-    sizes = joints.sizes[chosen]
+    sizes, along = joints.sizes[chosen], ends[1] - ends[0]
+    if apart is not None:
+        # Across the crack as a whole, from one of its sides to the other: of stairs the steps cancel.
+        sense = np.sign(apart[chosen] @ apart[widest])
+        x, y, z = (sense * sizes) @ joints.normals[chosen]
+        along = np.array([-x * z, -y * z, x**2 + y**2])
     return Crack(
         joints=chosen,
         width=float(moved[widest, 0]),
@@ -313,6 +321,7 @@ def _crack(
         widest=f"{a} | {b}",
         at=rings.middles()[widest],
         ends=ends,
+        along=along,
         size=float(sizes.sum()),
         areas=np.maximum(moved[chosen, 0], 0.0) * sizes,
         places=("", "") if places is None else (places.name(ends[0]), places.name(ends[1])),
@@ -338,14 +347,17 @@ def _meetings(joints: InitialJoints, chosen: np.ndarray, near: float) -> np.ndar
     return np.stack([one[meets], other[meets]])
 
 
-def _part_alike(faces: Faces, joints: InitialJoints, pairs: np.ndarray) -> np.ndarray:
-    """(n,) bool array: whether joints, (2, n) int array, part by about the same: the two sides of one crack do.
+def _apart(faces: Faces, joints: InitialJoints) -> np.ndarray:
+    """(n_joints, 3) array [m]: by how much the two sides of each joint have parted, at its corners in the mean."""
+    offsets = joints.rings.offsets
+    return np.asarray(np.add.reduceat(faces.on_a - faces.on_b, offsets[:-1]) / np.diff(offsets)[:, None])
+
+
+def _part_alike(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(n,) bool array: whether joints that part by these, (n, 3) arrays, part alike: the two sides of one crack do.
 
     Joints of a dome all meet; its meridians and the hinges between its courses are cracks of their own.
     """
-    rings = joints.rings
-    apart = np.add.reduceat(faces.on_a - faces.on_b, rings.offsets[:-1]) / np.diff(rings.offsets)[:, None]
-    one, other = apart[pairs]
     difference = np.minimum(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
     largest = np.maximum(np.linalg.norm(one, axis=1), np.linalg.norm(other, axis=1))
     return np.asarray(difference <= ALIKE * largest)

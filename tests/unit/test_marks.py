@@ -409,8 +409,23 @@ def test_a_stepped_crack_in_space_is_that_of_the_plane():
     values = crack.values()
     assert values["area"] == pytest.approx(1.5)
     assert (values["from"][0], values["from"][2], values["to"][0], values["to"][2]) == (2.0, 0.0, 3.0, 2.0)
-    assert crack.inclination == pytest.approx(np.degrees(np.arctan2(2.0, np.hypot(1.0, 0.5))))
-    assert "1.5 m², 61°, from (2, " in crack_rows([crack], 1)[0][1]
+    # However thick the wall is.
+    assert crack.inclination == pytest.approx(np.degrees(np.arctan2(2, 1)))
+    assert "1.5 m², 63°, from (2, " in crack_rows([crack], 1)[0][1]
+
+
+@pytest.mark.parametrize("depth", [0.1, 1.0, 3.0])
+def test_a_joint_in_space_is_as_steep_as_its_plane_not_its_diagonal(depth):
+    solid = in_space(
+        solver.Assembly.from_outlines([structures.rectangle(0, 0, 1, 1), structures.rectangle(1, 0, 2, 1)]), depth
+    )
+    (head,) = cracks_of(solid, moved_in_space(solid, {1: (0.02, 0.0, 0.0)}))
+    assert head.inclination == pytest.approx(90.0)
+    solid = in_space(
+        solver.Assembly.from_outlines([structures.rectangle(0, 0, 1, 1), structures.rectangle(0, 1, 1, 2)]), depth
+    )
+    (bed,) = cracks_of(solid, moved_in_space(solid, {1: (0.0, 0.0, 0.02)}))
+    assert bed.inclination == pytest.approx(0.0, abs=1e-6)
 
 
 def test_joints_that_part_otherwise_are_cracks_of_their_own():
