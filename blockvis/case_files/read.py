@@ -62,7 +62,11 @@ def read_case(path: str | Path, changes: str | Sequence[str] = ()) -> Case:
 def case_file_text(path: Path) -> str:
     """Read the text of a case file; raises ``ValueError`` where it is missing, a layout, or no text."""
     # What a program hands over, as /dev/stdin, is a pipe.
-    if not path.exists() or path.is_dir():
+    if path.is_dir():
+        inside = files_like(path / "case.toml", "*.toml", or_any=True)
+        hint = f"; in it are {', '.join(inside)}" if inside else ""
+        raise ValueError(f"'{path}' is a folder, not a case file (.toml){hint}")
+    if not path.exists():
         near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
         raise ValueError(f"there is no case file '{path}'{hint}")

@@ -117,6 +117,12 @@ def test_a_layout_in_place_of_the_case_file_is_named(capsys):
     assert '[geometry] file = "semicircular_arch.msh"' in said
 
 
+def test_a_folder_in_place_of_the_case_file_is_named_with_the_cases_in_it(tmp_path, capsys):
+    (tmp_path / "wall.toml").write_text("", encoding="utf-8")
+    assert run_command(tmp_path) == 2
+    assert f"'{tmp_path}' is a folder, not a case file (.toml); in it are wall.toml" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
