@@ -214,9 +214,9 @@ def _check_lines(lines: Sequence[LeftOut], layers: Sequence[str], sketch: Layout
         )
     closed = next((item for item in lines if item.closed), None)
     if closed is not None:
-        x, y = closed.place
+        at = place_text(closed.place, 6)
         raise ValueError(
-            f"{source}: [geometry] ties: '{closed.name}' on layer '{closed.layer}' at ({x:.6g}, {y:.6g}) is an "
+            f"{source}: [geometry] ties: '{closed.name}' on layer '{closed.layer}' at {at} is an "
             "outline, no line; move it to another layer"
         )
 

@@ -21,7 +21,7 @@ from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
 from blockvis.layout.solids import fans, volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
-from blockvis.text import LARGEST, listed
+from blockvis.text import LARGEST, listed, place_text
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -230,10 +230,8 @@ def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
                 body,
             )
         if not volume(points, faces) > NO_VOLUME * asked.size**3:
-            x, y, z = points.mean(axis=0)
-            raise _refused(
-                f"body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it", found, body
-            )
+            at = place_text(points.mean(axis=0), 6)
+            raise _refused(f"body '{body.name}' around {at} has no volume; remove or redraw it", found, body)
         if plane.warp:
             warped.append((plane.warp, body.name, plane.place))
         drawn = body.volume or abs(volume(body.points, body.faces))

@@ -13,7 +13,7 @@ from blockvis.layout.outlines import ROUNDING, flattened, loops_of
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.solids import area_vectors, fans, sides_of
 from blockvis.layout.surfaces import same_points, turned_faces
-from blockvis.text import listed
+from blockvis.text import listed, place_text
 from solver.mechanics import counted, linked
 
 from .bodies import Bodies, Body, as_drawn
@@ -71,17 +71,17 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
         points, faces = closed
         unique, inverse, counts = np.unique(sides_of(faces), axis=0, return_inverse=True, return_counts=True)
     if (counts == 1).any():
-        x, y, z = points[unique[counts == 1][0]].mean(axis=0)
+        at = place_text(points[unique[counts == 1][0]].mean(axis=0), 6)
         raise OpenSurface(
             f"body '{name}' is not closed: "
             f"{counted(int((counts == 1).sum()), 'edge belongs', 'edges belong')} to one face only, "
-            f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies, or leave it out (ignore)"
+            f"one around {at}; export closed bodies, or leave it out (ignore)"
         )
     if (counts > 2).any():
-        x, y, z = points[unique[counts > 2][0]].mean(axis=0)
+        at = place_text(points[unique[counts > 2][0]].mean(axis=0), 6)
         raise ValueError(
             f"body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
-            f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
+            f"edges belong to more than two faces, one around {at}; "
             "export one file or one named object per block (.obj, .glb, .step), none of them twice or inside out"
         )
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.

@@ -17,7 +17,7 @@ from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
 from blockvis.layout.outlines import ends_of, ring_of, ring_width
 from blockvis.layout.refusal import Refused
-from blockvis.text import as_toml, listed
+from blockvis.text import as_toml, listed, place_text
 from solver.mechanics import counted
 
 from .arcs import MEETS, with_shared_corners
@@ -207,11 +207,11 @@ def _without_mortar(found: Faces, reach: float) -> list[Note]:
     strip, across, are_joints = _strips(every, reach)
     if not strip.any():
         return []
-    x, y = every[int(strip.argmax())].mean(axis=0)
+    at = place_text(every[int(strip.argmax())].mean(axis=0), 6)
     words = f"mortar: {counted(int(strip.sum()), 'strip')} {across:.3g} units wide between larger faces"
     if not are_joints:
         said = "count as blocks; if they are mortar, draw each joint as one line or leave them out (ignore)"
-        return [Note(CHANGED, f"{words}, the first around ({x:.6g}, {y:.6g}), {said}")]
+        return [Note(CHANGED, f"{words}, the first around {at}, {said}")]
     why = "the faces between pairs of lines are mortar"
     found.left_out += [LeftOut("mortar", ring, why) for ring in compress(every, strip)]
     # Faces take the first of these, the pieces of each outline the next.
@@ -539,10 +539,9 @@ def _still_left_out(left_out: Sequence[LeftOut], closed: Sequence[Any], outlines
 
 
 def _with_a_hole(face: Any, ring: np.ndarray, layer: str) -> LeftOut:
-    x, y = np.array(face.interiors[0].coords).mean(axis=0)
+    at = place_text(np.array(face.interiors[0].coords).mean(axis=0), 6)
     message = (
-        f"the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
-        "or draw the blocks as closed outlines"
+        f"the lines around {at} leave a face with a hole; cut the block in two, or draw the blocks as closed outlines"
     )
     holes = tuple(np.array(inner.coords)[:-1] for inner in face.interiors)
     return LeftOut("hole", ring, message, layer, "face", holes=holes)

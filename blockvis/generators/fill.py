@@ -12,6 +12,7 @@ import shapely
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import largest_piece, pieces_of, without_collinear
+from blockvis.text import place_text
 from solver.mechanics import counted
 
 from .bricks import LOWEST_BRICK, NARROWEST, in_simple_pieces, places_in, without_slivers
@@ -218,9 +219,9 @@ def filled(
         stones = _with_mortar(stones, pattern.joint)
     notes = [_note(what, shapes, corner) for what, shapes in lacking.items()]
     if pattern.quoins and not quoins:
-        x, y = corner + wall.centroid.coords[0]
+        at = place_text(corner + wall.centroid.coords[0], 6)
         ends = f"upright, to {1e3 * LEANS:g} mm in a metre, {2.0 * pattern.quoins[1]:g} m high and free of openings"
-        said = f"bond: the wall around ({x:.6g}, {y:.6g}) has no quoins: no end is {ends}; give smaller ones"
+        said = f"bond: the wall around {at} has no quoins: no end is {ends}; give smaller ones"
         notes.append(Note(CHANGED, said))
     return Layout(
         blocks=tuple(without_collinear(np.array(shape.exterior.coords)[:-1], 1e-9) + corner for _, shape in stones),
@@ -257,10 +258,8 @@ def _check_inside(wall: shapely.Polygon, holes: Sequence[shapely.Polygon], corne
     """Refuse an opening outside of its wall; both are as seen from a corner."""
     for number, hole in enumerate(holes, start=1):
         if hole.intersection(wall).area <= DUST * hole.area:
-            x, y = corner + hole.centroid.coords[0]
-            raise ValueError(
-                f"opening {number} around ({x:.6g}, {y:.6g}) lies outside its wall; move it, or leave it out"
-            )
+            at = place_text(corner + hole.centroid.coords[0], 6)
+            raise ValueError(f"opening {number} around {at} lies outside its wall; move it, or leave it out")
 
 
 def _notches(solid: shapely.Polygon, grid: float) -> list[shapely.Polygon]:
@@ -336,9 +335,9 @@ def _without(wall: shapely.Geometry, parts: Sequence[shapely.Geometry], grid: fl
 
 def _note(what: str, openings: Sequence[shapely.Polygon], corner: np.ndarray) -> str:
     """Say of which openings the head is another than was asked for, or missing: ``what`` is what they have."""
-    x, y = np.array(openings[0].centroid.coords[0]) + corner
+    at = place_text(np.array(openings[0].centroid.coords[0]) + corner, 6)
     said = f"bond: {counted(len(openings), 'opening has', 'openings have')} no room for "
-    place = f", the first around ({x:.6g}, {y:.6g})"
+    place = f", the first around {at}"
     if not what:
         hang = "what lies over them may hang; give a smaller bearing or brick"
         return Note(CHANGED, f"{said}a head{place}: {hang}")

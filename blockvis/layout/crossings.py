@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import shapely
 
+from blockvis.text import place_text
+
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
@@ -51,12 +53,12 @@ def uncrossed(layout: Layout) -> Layout:
         lost = max(lost, 1.0 - share)
     if reduced:
         first = next(iter(reduced))
-        x, y = places[first] if first in places else _crossing(layout.outlines[first])
+        at = place_text(places[first] if first in places else _crossing(layout.outlines[first]), 6)
         words, the = "1 outline crosses or touches itself, ", ""
         if len(reduced) > 1:
             words, the = f"{len(reduced)} outlines cross or touch themselves, ", "the first "
         gone = f", with up to {100.0 * lost:.2g} % of the area gone" if lost > 1e-6 else ""
-        said = f"repaired: {words}{the}'{layout.names[first]}' at ({x:.6g}, {y:.6g}); the largest piece was kept{gone}"
+        said = f"repaired: {words}{the}'{layout.names[first]}' at {at}; the largest piece was kept{gone}"
         blocks = tuple(reduced.get(i, ring) for i, ring in enumerate(layout.outlines))
         layout = replace(layout, blocks=blocks, notes=(*layout.notes, Note(CHANGED, said)))
     return layout.leaving_out(reasons)
@@ -89,9 +91,9 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
     Or it goes in along a line ``around`` a hole and back: this polygon then.
     """
     if around is None:
-        x, y = _crossing(ring)
+        at = place_text(_crossing(ring), 6)
         message = (
-            f"block '{name}' crosses itself at ({x:.6g}, {y:.6g}), and its largest piece has only "
+            f"block '{name}' crosses itself at {at}, and its largest piece has only "
             f"{100.0 * share:.3g} % of its area; redraw it as one outline, or as several"
         )
         return LeftOut("crossing", ring, message)

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from blockvis.text import place_text
+
 from .notes import LEFT_OUT, Note
 
 #: Kinds of what is left out, for one and for many.
@@ -103,15 +105,17 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
     for kind, layer in dict.fromkeys((item.kind, item.layer) for item in left_out):
         members = [item for item in left_out if (item.kind, item.layer) == (kind, layer)]
         first = members[0]
-        # No minus before a zero.
-        x, y = first.place + 0.0
         words = KINDS[kind][len(members) > 1]
         where = f" on layer '{layer}'" if layer else ""
         called = f"'{first.name}' " if first.name and first.name != layer else ""
         misses = [item.miss for item in members if item.miss]
         apart = f"{min(misses):.3g} to {max(misses):.3g}" if len(misses) > 1 else "".join(f"{m:.3g}" for m in misses)
         ends = f", {'their' if len(members) > 1 else 'its'} ends {apart} apart" if misses else ""
-        at = f", {'the first ' if len(members) > 1 else ''}{called}at ({x:.6g}, {y:.6g})" if len(first.points) else ""
+        at = (
+            f", {'the first ' if len(members) > 1 else ''}{called}at {place_text(first.place, 6)}"
+            if len(first.points)
+            else ""
+        )
         nearly = any(item.miss and item.miss < NEARLY * float(np.ptp(item.points, axis=0).max()) for item in members)
         are_ties = kind == "open" and TIES.search(layer)
         tied = f'; to take them for ties: [geometry] ties = ["{layer}"]' if are_ties else ""

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import shapely
 
+from blockvis.text import place_text
+
 from .left_out import LeftOut
 from .linked import equal_rows
 from .notes import CHANGED, UPRIGHT, Note
@@ -178,8 +180,8 @@ def ends_of(lines: Iterable[np.ndarray]) -> np.ndarray:
 
 def around_hole(called: str, outline: np.ndarray, holes: Sequence[np.ndarray]) -> LeftOut:
     """Say that a block has a hole; its outline and those of its holes are (n, 2) arrays."""
-    x, y = holes[0].mean(axis=0)
-    message = f"{called} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
+    at = place_text(holes[0].mean(axis=0), 6)
+    message = f"{called} has a hole around {at}; cut the block in two, or fill the hole with a block"
     return LeftOut("hole", outline, message, holes=tuple(holes))
 
 
@@ -266,11 +268,11 @@ def _ring(
     """Outline of a block, which may be one whole cell, and why it cannot be used if so."""
     loops, crossing = loops_of(edges)
     if crossing is not None:
-        x, y = points[crossing]
+        at = place_text(points[crossing], 6)
         around = points[np.unique(edges)]
         meeting = sum(crossing in edge for edge in edges)
         message = (
-            f"the outline of block '{name}' meets itself at ({x:.6g}, {y:.6g}), where {meeting} of its edges "
+            f"the outline of block '{name}' meets itself at {at}, where {meeting} of its edges "
             "end; a block is one piece with one outline"
         )
         return around, LeftOut("pieces", around, message, serious=True)
@@ -288,10 +290,8 @@ def _ring(
         return ring, None
     if len(filled(rings)) == 1:
         return ring, around_hole(f"block '{name}'", ring, rings[1:])
-    x, y = rings[1].mean(axis=0)
-    message = (
-        f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
-    )
+    at = place_text(rings[1].mean(axis=0), 6)
+    message = f"block '{name}' is in {len(rings)} separate pieces, one around {at}; give each its own block"
     return ring, LeftOut("pieces", ring, message, serious=True)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from blockvis.text import by_similarity
+from blockvis.text import by_similarity, place_text
 from solver import mechanics
 
 from .layout import Layout
@@ -146,9 +146,9 @@ def _opened_by(
         and share_in(one.shape, region.wall) > (ROUNDING if asked else INSIDE)
     ]  # fmt: skip
     if asked and not opened:
-        x, y = one.shape.centroid.coords[0]
+        at = place_text(one.shape.centroid.coords[0], 6)
         raise ValueError(
-            f"'{source}': the opening '{one.labels[-1]}' on layer '{one.labels[0]}' around ({x:.6g}, {y:.6g}) lies "
+            f"'{source}': the opening '{one.labels[-1]}' on layer '{one.labels[0]}' around {at} lies "
             "outside of the walls; move it into one, or leave it out (ignore)"
         )
     return opened
@@ -213,9 +213,10 @@ def _no_outline(layout: Layout, drawn: Sequence[_Drawn], key: str, pattern: str)
         if not one.closed and one.kind == "open" and matches((one.layer, one.name), [pattern])
     ]
     if lines:
-        gap, (x, y) = _smallest_gap(lines)
+        gap, place = _smallest_gap(lines)
+        at = place_text(place, 6)
         return (
-            f"bond: the outline on layer '{lines[0].layer}' is open by {gap:.3g} m at ({x:.6g}, {y:.6g}); close it: "
+            f"bond: the outline on layer '{lines[0].layer}' is open by {gap:.3g} m at {at}; close it: "
             "join the ends of its lines"
         )
     layers = Counter(one.labels[0] or one.labels[-1] for one in drawn)
@@ -241,9 +242,9 @@ def _reaching_out(every: Sequence[tuple[Region, int]]) -> list[str]:
         for opening in region.openings:
             out = 1.0 - share_in(opening, region.wall)
             if out > REPORTED:
-                x, y = opening.centroid.coords[0]
+                at = place_text(opening.centroid.coords[0], 6)
                 found.append(
-                    f"bond: {out:.0%} of the opening around ({x:.6g}, {y:.6g}) lies outside of its wall on layer "
+                    f"bond: {out:.0%} of the opening around {at} lies outside of its wall on layer "
                     f"'{region.layer}'; what lies in it is taken out"
                 )
     return [Note(CHANGED, text) for text in found]
