@@ -140,14 +140,3 @@ def test_in_space_an_acceleration_acts_on_the_fill_along_a_pushover() -> None:
     for increment in structure.pushover(control).path:
         lean = -float(increment.pose.rotations[0, 0])
         assert increment.measured == pytest.approx(multiplier_by_hand(lean), abs=1e-5)
-
-
-@pytest.mark.thorough
-def test_a_pushover_under_fill_is_that_of_a_block_by_hand() -> None:
-    control = solver.ControlDisplacement("block", point=(0.5, 1.0), increment=0.2, limit=0.2)
-    response = filled_block().pushover(control)
-    assert len(response.path) == 2
-    for increment in response.path:
-        lean = -float(increment.pose.rotations[0, 0])
-        assert turned_by(lean, [0.5, 1.0])[0] + 0.5 == pytest.approx(increment.parameter, abs=1e-5)
-        assert increment.measured == pytest.approx(multiplier_by_hand(lean), abs=1e-6)
