@@ -11,7 +11,7 @@ import pytest
 import pyvista as pv
 import shapely
 from scipy.integrate import solve_ivp
-from structures import arch_response, box, parted, pixels, rectangle, report_of, wall
+from structures import arch_response, box, in_either, parted, pixels, rectangle, report_of, wall
 
 import blockvis
 import solver
@@ -64,11 +64,7 @@ def test_a_lintel_falls_to_the_floor_whether_its_abutments_are_taller_or_wider(w
     rectangles = [(0, 0, 2, 0.4), (0.2 - width, -3, 0.2, 0), (1.8, -3, 1.8 + width, 0), (-4, -3.5, 6, -3)]
     rectangles += [(0.9, -9, 1.1, -3.5)]
     roles, removed = ["free", "fixed", "moving", "fixed", "fixed"], np.arange(5) == 4
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines([rectangle(*at) for at in rectangles], roles=roles)
-    else:
-        solids = [box((x0, 0.0, z0), (x1, 0.5, z1)) for x0, z0, x1, z1 in rectangles]
-        assembly = solver.Assembly.from_solids(solids, roles=roles)
+    assembly = in_either(dimension, [rectangle(*at) for at in rectangles], roles=roles)
     height, _ = ground_below(assembly, solver.Pose.initial(assembly), removed)
     assert height == pytest.approx(-3.0, abs=2e-3)
 
@@ -233,10 +229,7 @@ def test_a_block_in_flight_turns_ever_faster_by_its_moment_and_falls_no_slower(d
     """It slides off a ledge that is drawn away below it, and keeps a moment of 200 N·m."""
     drawn = [(0.0, 0.0, 1.0, 0.4), (-1.0, -0.5, 0.55, 0.0), (-0.5, 0.05, 0.0, 0.4), (-9.0, -20.0, 9.0, -19.0)]
     roles, moment = ["free", "moving", "fixed", "fixed"], -200.0 if dimension == 2 else 200.0
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines([rectangle(*at) for at in drawn], roles=roles)
-    else:
-        assembly = solver.Assembly.from_solids([box((a, 0, b), (c, 1, d)) for a, b, c, d in drawn], roles=roles)
+    assembly = in_either(dimension, [rectangle(*at) for at in drawn], roles=roles)
     loads = solver.self_weight(assembly)
     loads.dead[0, 2 * dimension - 2] = moment
     away = solver.Settlement(direction=(-1, *[0] * (dimension - 1)), increment=0.02, limit=0.5, tolerance=1e-3)

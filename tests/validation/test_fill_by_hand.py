@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from structures import box, upright
+from structures import box, in_either
 
 import solver
 from blockvis import generators, lay_backfill
@@ -24,9 +24,7 @@ def mirrored(outline: np.ndarray) -> np.ndarray:
 def two_block_arch(dimension: int) -> solver.Assembly:
     outlines = [HALF, mirrored(HALF), GROUND, mirrored(GROUND)]
     labels = {"names": ["left half", "right half", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
-    if dimension == 2:
-        return solver.Assembly.from_outlines(outlines, density=DENSITY, **labels)
-    return solver.Assembly.from_solids([upright(outline, 0.0, 1.0) for outline in outlines], density=DENSITY, **labels)
+    return in_either(dimension, outlines, density=DENSITY, **labels)
 
 
 def under(assembly: solver.Assembly, fill: solver.Backfill) -> solver.Loads:
