@@ -88,6 +88,13 @@ def upright(outline, first: float, last: float) -> tuple[np.ndarray, list[list[i
     return corners[:, [0, 2, 1]], [face[::-1] for face in faces]
 
 
+def in_either(dimension: int, outlines, solid=upright, **given) -> solver.Assembly:
+    """Blocks of these outlines in the plane, a metre thick, or in space, from y or z = 0 to 1 m."""
+    if dimension == 2:
+        return solver.Assembly.from_outlines(outlines, **given)
+    return solver.Assembly.from_solids([solid(outline, 0.0, 1.0) for outline in outlines], **given)
+
+
 def with_hole(outer, inner) -> tuple[np.ndarray, list[list[int]]]:
     """Extrude what lies between two outlines of four corners by 1 m upwards; its faces with the hole are two each."""
     plan = np.array([*outer, *inner], dtype=float)

@@ -27,13 +27,7 @@ def test_script_with_arcs_becomes_chords_within_the_tolerance(tmp_path):
 
 
 def test_solids_of_a_step_file(tmp_path):
-    gmsh.initialize(["gmsh", "-nopopup"], interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    for k in range(3):
-        gmsh.model.occ.addBox(1000 * k, 0, 0, 1000, 300, 250)
-    gmsh.model.occ.synchronize()
-    gmsh.write(str(tmp_path / "a.step"))
-    gmsh.finalize()
+    step(tmp_path)
     drawing = read_layout(tmp_path / "a.step")
     assert drawing.n_blocks == 3
     # STEP names its unit, here mm; the bodies share their planes along z and along y, and z comes first.

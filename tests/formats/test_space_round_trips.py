@@ -22,25 +22,7 @@ def vault():
     """Stones with three to eight faces, re-entrant ones, names with blanks and letters beyond ASCII."""
     built = generators.cross_vault(voussoirs=3, stone=2.0)
     names = [name.replace("keystone", 'Schlußstein "K"') for name in built.names]
-    density = 2000.0 + 10.0 * np.arange(built.n_blocks)
-    solids = [
-        (
-            built.vertices[built.block_of_vertex == i],
-            [
-                (ring - built.shapes.offsets[i]).tolist()
-                for ring, block in zip(
-                    np.split(built.shapes.corners, built.shapes.face_offsets[1:-1]),
-                    built.shapes.block_of_face,
-                    strict=True,
-                )
-                if block == i
-            ],
-        )
-        for i in range(built.n_blocks)
-    ]
-    return solver.Assembly.from_solids(
-        solids, names=names, roles=built.roles.tolist(), materials=built.materials, density=density
-    )
+    return replace(built, names=tuple(names), density=2000.0 + 10.0 * np.arange(built.n_blocks))
 
 
 @pytest.mark.parametrize("suffix", WRITTEN)

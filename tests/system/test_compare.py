@@ -35,12 +35,28 @@ def table(page, name):
     }
 
 
+def compared(tmp_path, *folders):
+    """The page of two runs beside each other, without a film."""
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    return (tmp_path / "both" / "compare.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def picture_of(monkeypatch):
+    """Takes what is to look at each picture instead of drawing it."""
+
+    def taken(look):
+        blank = Image.new("RGB", (800, 620))
+        monkeypatch.setattr("blockvis.pictures.drawer.Drawer.picture", lambda *of, **told: look(*of, **told) or blank)
+
+    return taken
+
+
 @pytest.mark.slow
 def test_numbers_curves_and_cracks_stand_side_by_side(arch_folder, other, tmp_path, capsys):
     out = tmp_path / "both"
-    assert main(["compare", str(arch_folder), str(other), "-o", str(out), "--animation", "none"]) == 0
+    page = compared(tmp_path, arch_folder, other)
     assert f"compared in {out}/: compare.html, curves.png, side_by_side.png" in capsys.readouterr().out
-    page = (out / "compare.html").read_text(encoding="utf-8")
     assert "No case in out and sinking, written from Python" in page
     numbers = table(page, "numbers")
     assert numbers[""] == ["out", "sinking"]
@@ -81,7 +97,7 @@ def test_a_multiplier_is_one_curve_however_supports_move(tmp_path):
     folders = [str(tmp_path / name) for name in ("one", "two")]
     for folder in folders:
         assert main(["run", str(tmp_path / "case.toml"), "-o", folder, "--no-pictures"]) == 0
-    assert main(["compare", *folders, "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    compared(tmp_path, *folders)
     curve = (np.abs(pixels(tmp_path / "both" / "curves.png") - np.array((20, 92, 168))).sum(axis=2) == 0)[150:]
     assert curve.any(axis=0).sum() > 0.1 * curve.shape[1], "between the dashes of the other"
 
@@ -91,8 +107,7 @@ def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp
     settlement = solver.Settlement((0, -1), increment=0.02, limit=0.06)
     sinking = solver.Structure(generators.arch(), friction_coefficient=2.0).settle(settlement)
     folder = blockvis.write(sinking, tmp_path / "down-results")
-    assert main(["compare", str(folder), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
-    cracks = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "cracks")
+    cracks = table(compared(tmp_path, folder, other), "cracks")
     assert cracks.pop("") == ["down", "sinking"]
     names, known = sinking.assembly.names, [blockvis.open_results(at).joints(3) for at in (folder, other)]
     rows = list(zip(known[0]["block_a"], known[0]["block_b"], *(one["opening"] for one in known), strict=False))
@@ -104,34 +119,32 @@ def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp
 
 @pytest.mark.parametrize(("opening", "told"), [(1.1846e-3, "1.18 mm"), (3e-13, "0 mm")])
 @pytest.mark.slow
-def test_widths_of_cracks_are_rounded_once(arch_folder, other, tmp_path, monkeypatch, opening, told):
+def test_widths_of_cracks_are_rounded_once(arch_folder, other, tmp_path, monkeypatch, picture_of, opening, told):
     """As the report of each run has them; what rounding leaves of a closed joint is no width."""
     openings = "blockvis.comparison.compared.opening_and_slip"
     monkeypatch.setattr(openings, lambda assembly, joints, pose: np.tile([opening, 0.0], (len(joints), 1)))
-    picture, blank = "blockvis.pictures.drawer.Drawer.picture", Image.new("RGB", (800, 620))
-    monkeypatch.setattr(picture, lambda *of, **look: blank)
-    assert main(["compare", str(arch_folder), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
-    cracks = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "cracks")
+    picture_of(lambda *of, **look: None)
+    cracks = table(compared(tmp_path, arch_folder, other), "cracks")
     assert cracks.pop("") == ["out", "sinking"]
     assert {cell for cells in cracks.values() for cell in cells} == {told}
 
 
-def test_both_pictures_of_a_settlement_have_one_unit(arch_folder, other, tmp_path, monkeypatch):
+def test_both_pictures_of_a_settlement_have_one_unit(arch_folder, other, tmp_path, picture_of):
     """That of the run that goes further."""
-    titles, blank = [], Image.new("RGB", (800, 620))
-    picture = "blockvis.pictures.drawer.Drawer.picture"
-    monkeypatch.setattr(picture, lambda *of, title="", **look: titles.append(title.split("   ")[0]) or blank)
-    assert main(["compare", str(arch_folder), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    titles = []
+    picture_of(lambda *of, title="", **look: titles.append(title.split("   ")[0]))
+    compared(tmp_path, arch_folder, other)
     assert titles == [f"Settlement {at} m" for at in ("0.0200", "0.0400", "0.0600") for _ in range(2)]
 
 
 @pytest.mark.parametrize("name", ["both.gif", "both.webp"])
 @pytest.mark.slow
-def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(name, arch_folder, other, tmp_path, monkeypatch):
+def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(
+    name, arch_folder, other, tmp_path, monkeypatch, picture_of
+):
     """Openings are to be compared by eye, and no browser plays a .gif as a video."""
-    scales, blank = [], Image.new("RGB", (800, 620))
-    picture = "blockvis.pictures.drawer.Drawer.picture"
-    monkeypatch.setattr(picture, lambda drawer, *of, **look: scales.append(drawer.scene.pixel) or blank)
+    scales = []
+    picture_of(lambda drawer, *of, **look: scales.append(drawer.scene.pixel))
     film = "blockvis.comparison.write.film_in_step"
     monkeypatch.setattr(film, lambda found, path, progress: path.write_bytes(b""))
     further = blockvis.write(arch_response(), tmp_path / "falls")
@@ -143,17 +156,15 @@ def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(name, arch_f
 
 
 @pytest.mark.slow
-def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, monkeypatch):
+def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, picture_of):
     """The reaction leaves that at rest at once: a line from there gave one path two reactions, by its increments."""
-    titles, blank, folders = [], Image.new("RGB", (800, 620)), []
-    picture = "blockvis.pictures.drawer.Drawer.picture"
-    monkeypatch.setattr(picture, lambda *of, title="", **look: titles.append(title) or blank)
+    titles, folders = [], []
+    picture_of(lambda *of, title="", **look: titles.append(title))
     structure = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0)
     for step in (0.01, 0.02):
         response = structure.settle(solver.Settlement((1, 0), increment=step, limit=0.04))
         folders.append(blockvis.write(response, tmp_path / f"{step}"))
-    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
-    numbers = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "numbers")
+    numbers = table(compared(tmp_path, *folders), "numbers")
     first, second, last = (cells for name, cells in numbers.items() if name.startswith("reaction at settlement"))
     assert first[1] == "–" != first[0]
     assert "–" not in (*second, *last)
@@ -161,10 +172,9 @@ def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, monk
 
 
 @pytest.mark.slow
-def test_blocks_in_space_are_seen_from_one_side(tmp_path, monkeypatch):
-    sights, blank, folders = [], Image.new("RGB", (800, 620)), []
-    picture = "blockvis.pictures.drawer.Drawer.picture"
-    monkeypatch.setattr(picture, lambda drawer, *of, **look: sights.append(drawer.sight) or blank)
+def test_blocks_in_space_are_seen_from_one_side(tmp_path, picture_of):
+    sights, folders = [], []
+    picture_of(lambda drawer, *of, **look: sights.append(drawer.sight))
     pads = [box((x, y, -0.2), (x + 0.3, y + 0.3, 0.0)) for x in (0.0, 0.7) for y in (0.0, 0.7)]
     columns = [box((x + 0.05, y + 0.05, 0.0), (x + 0.25, y + 0.25, 1.0)) for x in (0.0, 0.7) for y in (0.0, 0.7)]
     for sinks in (0, 3):
@@ -174,7 +184,7 @@ def test_blocks_in_space_are_seen_from_one_side(tmp_path, monkeypatch):
         )
         response = structure.settle(solver.Settlement((0, 0, -1), increment=0.01, limit=0.01))
         folders.append(blockvis.write(response, tmp_path / f"{sinks}"))
-    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    compared(tmp_path, *folders)
     assert len(sights) == 6
     assert len(set(sights)) == 1
 
@@ -185,8 +195,7 @@ def test_places_of_several_settlements_are_told_as_their_sum(tmp_path):
     for step in (1e-3, 2e-3):
         response = structure.settle([solver.Settlement((1, 0), increment=step, limit=step)] * 2)
         folders.append(blockvis.write(response, tmp_path / f"{step}"))
-    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
-    numbers = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "numbers")
+    numbers = table(compared(tmp_path, *folders), "numbers")
     assert any(name.endswith(" at settlement 2.00 mm, all phases added") for name in numbers), list(numbers)
 
 
@@ -197,8 +206,7 @@ def test_where_one_run_ends_the_next_settlement_of_the_other_has_not_begun(tmp_p
     folders = [tmp_path / "one", tmp_path / "two"]
     for folder, settlements in zip(folders, ([first], [first, second]), strict=True):
         blockvis.write(structure.settle(settlements), folder)
-    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
-    numbers = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "numbers")
+    numbers = table(compared(tmp_path, *folders), "numbers")
     (told,) = [cells for name, cells in numbers.items() if name.endswith("1.00 mm, all phases added")]
     assert told[0] == told[1]
 
@@ -212,8 +220,7 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
         # Of numbers as of dates the seventh digit tells.
         changes += [f"material.density={density}", f"imperfections=[{{{SCATTER}, seed={20260100 + int(friction[0])}}}]"]
         blockvis.run_case(blockvis.read_case(CASE, changes=changes), folders[-1], outputs=())
-    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
-    page = (tmp_path / "both" / "compare.html").read_text(encoding="utf-8")
+    page = compared(tmp_path, *folders)
     assert table(page, "keys") == {
         "": ["1.5", "2.0"],
         "material.friction_coefficient": ["1.5", "2"],
@@ -223,9 +230,7 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
     # Of a case that was changed in Python no key is known, and none of the other is a difference.
     changed = replace(blockvis.read_case(CASE, changes=changes), friction_coefficient=1.0)
     blockvis.run_case(changed, tmp_path / "changed", outputs=())
-    pair = str(folders[0]), str(tmp_path / "changed")
-    assert main(["compare", *pair, "-o", str(tmp_path / "one"), "--animation", "none"]) == 0
-    page = (tmp_path / "one" / "compare.html").read_text(encoding="utf-8")
+    page = compared(tmp_path / "one", folders[0], tmp_path / "changed")
     assert "No case in changed, written from Python" in page
     assert 'id="keys"' not in page
 
@@ -284,16 +289,14 @@ kind = "live"
 
 
 @pytest.mark.slow
-def test_loads_that_move_are_compared_where_they_are_lowest(tmp_path, monkeypatch):
+def test_loads_that_move_are_compared_where_they_are_lowest(tmp_path, picture_of):
     """Between two positions, on the line between their limit loads, nothing is a limit state."""
     folders, seen, lowest = [], [], []
     for places in ([-0.9, 0.9, 4], [-0.9, -0.1, 3]):
         folders.append(tmp_path / f"{places[-1]}")
         case = case_from(f"{LIMIT_LOADS}force = [0, -1000]\npositions = {places}\n", tmp_path)
         lowest.append(blockvis.run_case(case, folders[-1], outputs=()).response.governing.parameter)
-    blank = Image.new("RGB", (800, 620))
-    picture = "blockvis.pictures.drawer.Drawer.picture"
-    monkeypatch.setattr(picture, lambda _, increment, **look: seen.append(increment.parameter) or blank)
+    picture_of(lambda _, increment, **look: seen.append(increment.parameter))
     assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both")]) == 0
     assert seen == lowest
 

@@ -135,11 +135,15 @@ def test_a_file_where_the_folder_should_be(case, tmp_path, capsys):
     assert (tmp_path / "out").read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.parametrize("name", ["report.html", "curve.png", "response.csv", "assembly.npz", "blocks.pvd"])
+@pytest.mark.parametrize(
+    "name", ["report.html", "curve.png", "response.csv", "summary.json", "assembly.npz", "blocks.pvd"]
+)
 def test_nothing_of_that_name_is_overwritten_without_force(case, tmp_path, capsys, name):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / name).write_text("mine", encoding="utf-8")
     assert run_command(case, "-o", tmp_path / "out") == 2
-    assert f"({name})" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"({name})" in said
+    assert "--force" in said
     assert [p.name for p in (tmp_path / "out").iterdir()] == [name]
     assert (tmp_path / "out" / name).read_text(encoding="utf-8") == "mine"

@@ -167,7 +167,11 @@ def test_a_support_that_moves_down_has_its_arrow_in_the_picture(folder, monkeypa
 
     monkeypatch.setattr(Axes, "annotate", noted)
     rows = [{"block": "right springer", "dx [mm]": 0.0, "dy [mm]": -9.0}]
-    blockvis.explain(folder / "arch.toml", rows, folder / "arrow")
+    found = blockvis.explain(folder / "arch.toml", rows, folder / "arrow")
+    # How it was seen to move is what has happened.
+    assert found.causes[0].name == "right springer moves down"
+    assert found.causes[0].amount[1] == pytest.approx(0.009, rel=0.1)
+    assert found.causes[0].probability > 0.5
     assert tips
     for panel, tip in tips[1:]:
         low, high = np.transpose([panel.get_xlim(), panel.get_ylim()])
@@ -371,9 +375,6 @@ def test_a_drawing_of_the_damaged_arch_is_explained(folder, tmp_path):
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ("joint\nvoussoir 1 | voussoir 2\n", "has no column 'width'"),
-        ("joint,width [mm]\nvoussoir 1 | vousoir 2,3\n", "did you mean 'voussoir"),
-        ("joint,width [mm]\nvoussoir 1 | voussoir 2,-3\n", "line 2: width [mm] is -3; give a width of at least 0"),
         ("joint,width [mm]\nvoussoir 1 | voussoir 2,3,5\n", "line 2: has 3 cells, and the first line 2; where numbers"),
         (
             "block,dx [mm],dy [mm],uncertainty [mm]\nvoussoir 1,3,2,-1\n",
@@ -381,7 +382,6 @@ def test_a_drawing_of_the_damaged_arch_is_explained(folder, tmp_path):
         ),
         ("block,dx,dy\nvoussoir 1,3,2\n", "line 2: dx puts 'voussoir 1' 3.61 m from where it is drawn"),
         ("x,y,width\n0,0.5,2\n", "line 2: width is 2 m, more than a block is wide"),
-        ("x,y,width\n0,0.5,closed\n", "nothing has opened or moved"),
     ],
 )
 def test_observations_that_cannot_be_used_end_with_bad_input(folder, tmp_path, capsys, table, words):
@@ -521,15 +521,6 @@ def test_the_springer_of_a_vault_that_has_sunk_comes_first(tmp_path, capsys):
     assert all(third.sum() > 100 for third in np.array_split(orange, 3, axis=1))
 
 
-@pytest.mark.slow
-def test_how_a_support_was_seen_to_move_is_what_has_happened(folder):
-    rows = [{"block": "right springer", "dx [mm]": 0.0, "dy [mm]": -9.0}]
-    found = blockvis.explain(folder / "arch.toml", rows)
-    assert found.causes[0].name == "right springer moves down"
-    assert found.causes[0].amount[1] == pytest.approx(0.009, rel=0.1)
-    assert found.causes[0].probability > 0.5
-
-
 def test_an_analysis_of_another_kind_is_refused(folder, tmp_path, capsys):
     (tmp_path / "case.toml").write_text(CASE + '[analysis]\nkind = "limit load"\n', encoding="utf-8")
     command = ["explain", str(tmp_path / "case.toml"), "--observed", str(folder / "cracks.csv")]
@@ -539,7 +530,6 @@ def test_an_analysis_of_another_kind_is_refused(folder, tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("whose", ["processes", "a scheduler's"])
-@pytest.mark.slow
 def test_workers_give_the_same_answer(folder, said, scheduler, tmp_path, whose):
     workers = ["--workers", "2"] if whose == "processes" else ["--scheduler", scheduler]
     command = ["explain", str(folder / "arch.toml"), "--observed", str(folder / "cracks.csv"), *workers]

@@ -72,13 +72,23 @@ def test_blocks_in_space_are_on_paper_as_they_are_asked_for(tmp_path, monkeypatc
     assert seen == [({"azimuth": 30, "elevation": 20}, "y = 0.2")] * 3
 
 
+def tables_on_paper(folder, monkeypatch):
+    """Title, head, rows and widths of each table."""
+    tables = []
+    monkeypatch.setattr("blockvis.report.pdf._Paper.tabulate", lambda _, *table: tables.append(table))
+    assert main(["report", str(folder), "--pdf"]) == 0
+    return tables
+
+
+def states_on_paper(response, folder, monkeypatch):
+    tables = tables_on_paper(blockvis.write(response, folder / "out"), monkeypatch)
+    return next(table for table in tables if table[0].startswith("States"))
+
+
 @pytest.mark.slow
 def test_the_table_of_cracks_says_what_they_run_between(arch_results, monkeypatch):
-    tables = {}
-    table = "blockvis.report.pdf._Paper.tabulate"
-    monkeypatch.setattr(table, lambda _, title, head, rows, widths: tables.update({title: (rows, widths)}))
-    assert main(["report", str(arch_results), "--pdf"]) == 0
-    rows, widths = tables["Cracks at the last equilibrium"]
+    tables = tables_on_paper(arch_results, monkeypatch)
+    rows, widths = next(table[2:] for table in tables if table[0] == "Cracks at the last equilibrium")
     assert sum(widths) <= 174.0
     ends = [end for row in rows for end in row[-2:]]
     assert any(re.fullmatch(r"the (ground|top), at -?\d+\.\d\d, -?\d+\.\d\d", end) for end in ends), ends
@@ -100,23 +110,13 @@ def test_keys_that_are_not_in_use_are_not_on_paper(arch_results, monkeypatch):
 
 @pytest.mark.slow
 def test_states_of_a_rotation_are_told_in_rad_with_their_moment(tmp_path, monkeypatch):
-    tables = {}
-    monkeypatch.setattr("blockvis.report.pdf._Paper.tabulate", lambda _, title, *table: tables.update({title: table}))
     response = moved_and_turned()
-    assert main(["report", str(blockvis.write(response, tmp_path / "out")), "--pdf"]) == 0
+    title, _, rows, _ = states_on_paper(response, tmp_path, monkeypatch)
     last = response.path[-1].measured
-    rows = tables["States"][1]
+    assert title == "States"
     assert rows[1][0] == "1.00 mm, phase 1"
     assert rows[1][1].endswith(" kN")
     assert rows[-1] == ("0.00100 rad, phase 2", f"{last:.4g} N·m", "")
-
-
-def states_on_paper(response, folder, monkeypatch):
-    """Title, head, rows and widths of the table of states."""
-    tables = []
-    monkeypatch.setattr("blockvis.report.pdf._Paper.tabulate", lambda _, *table: tables.append(table))
-    assert main(["report", str(blockvis.write(response, folder / "out")), "--pdf"]) == 0
-    return next(table for table in tables if table[0].startswith("States"))
 
 
 @pytest.mark.slow

@@ -108,13 +108,6 @@ def test_the_failure_of_a_run_is_the_heading():
     assert 'class="failed"' not in report_of(arch_response())
 
 
-@pytest.mark.slow
-def test_the_report_of_an_example_stays_below_a_megabyte(tmp_path):
-    response = parted(wall(34, 46), 11, 0)
-    assert response.assembly.n_blocks > 1_550
-    assert write_report(response, tmp_path / "report.html").stat().st_size < 1_000_000
-
-
 @browser
 def test_the_tip_of_a_block_lists_its_joints(tmp_path):
     response = arch_response()

@@ -336,6 +336,14 @@ def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
         assert "cannot go on" in capsys.readouterr().err
 
 
+def _goes_on(told, k, again):
+    """What follows the k-th increment is told again, bit for bit."""
+    names = ("settlement", "pose", "forces", "velocity", "reaction", "load_multiplier", "certificate", "programs")
+    for one, other in zip(again, told[k + 1 :], strict=True):
+        for name in (*names, "checkpoint"):
+            assert same(getattr(one, name), getattr(other, name)), (k, name)
+
+
 @pytest.mark.thorough
 def test_every_checkpoint_leads_to_the_same_end():
     arch = generators.arch(voussoirs=13)
@@ -351,22 +359,8 @@ def test_every_checkpoint_leads_to_the_same_end():
     told = list(mechanics.settlement_increments(arch, phases, **setting))
     assert {i.phase for i in told} == {0, 1}
     for k in range(0, len(told), 3):
-        if told[k].checkpoint is None:
-            continue
-        again = list(mechanics.settlement_increments(arch, phases, resume=told[k].checkpoint, **setting))
-        assert len(again) == len(told) - k - 1
-        for one, other in zip(again, told[k + 1 :], strict=True):
-            for name in (
-                "settlement",
-                "pose",
-                "forces",
-                "velocity",
-                "reaction",
-                "certificate",
-                "programs",
-                "checkpoint",
-            ):
-                assert same(getattr(one, name), getattr(other, name)), (k, name)
+        if told[k].checkpoint is not None:
+            _goes_on(told, k, mechanics.settlement_increments(arch, phases, resume=told[k].checkpoint, **setting))
 
 
 @pytest.mark.thorough
@@ -384,11 +378,7 @@ def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
     assert len(kept) > 5
     for k in kept:
         checkpoint = told[k].checkpoint
-        again = list(mechanics.pushover_increments(arch, control, resume=checkpoint, **setting))
-        assert len(again) == len(told) - k - 1
-        for one, other in zip(again, told[k + 1 :], strict=True):
-            for name in ("settlement", "load_multiplier", "pose", "forces", "velocity", "programs", "checkpoint"):
-                assert same(getattr(one, name), getattr(other, name)), (k, name)
+        _goes_on(told, k, mechanics.pushover_increments(arch, control, resume=checkpoint, **setting))
     other = generators.arch(voussoirs=12)
     setting["loads"] = solver.Loads(solver.self_weight(other).dead, solver.weight_fraction(other, (1.0, 0.0), [3]))
     with pytest.raises(ValueError, match=r"has 15 blocks, the assembly 14: it belongs to another run"):

@@ -17,7 +17,7 @@ from blockvis import write_report
 from blockvis.cli import _say_error, main
 from blockvis.report.page import add_error
 from blockvis.runs import step_check
-from blockvis.runs.once_more import takes_steps, traced
+from blockvis.runs.once_more import traced
 from blockvis.runs.step_check import StepCheck, StepChecking, compared, stored_check
 from solver import mechanics
 
@@ -139,19 +139,16 @@ def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
 
 
 @pytest.mark.thorough
-def test_linear_programs_take_no_steps_that_could_be_compared(tmp_path, capsys):
-    text = SHORT + '\n[analysis]\nincrements = "linear program"\n'
-    assert not takes_steps(case_from(text, tmp_path))
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (SHORT + '[analysis]\nincrements = "linear program"\n', "settlement, 2 increments, by linear program"),
+        (LIMIT_LOAD, "limit load"),
+    ],
+)
+def test_what_has_no_steps_is_refused(text, what, tmp_path, capsys):
     assert run_here(tmp_path, text, "--check-steps") == 2
-    error = capsys.readouterr().err
-    assert "has no path whose steps could be checked (settlement, 2 increments, by linear program)" in error
-
-
-@pytest.mark.thorough
-def test_what_has_no_steps_is_refused(tmp_path):
-    done = run(tmp_path, LIMIT_LOAD, "--check-steps")
-    assert done.returncode == 2
-    assert "has no path whose steps could be checked (limit load" in done.stderr
+    assert f"has no path whose steps could be checked ({what}" in capsys.readouterr().err
     assert (tmp_path / "out" / "summary.json").is_file()
 
 

@@ -424,16 +424,22 @@ def cluster(tmp_path):
         yield started
 
 
+def _begun(study, out, address):
+    """The process of a study on a cluster, of which some runs have been made."""
+    command = [sys.executable, "-m", "blockvis", "sweep", str(study), "-o", str(out), "--scheduler", address]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while finished_runs(out) < 3 and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    return process
+
+
 @pytest.mark.slow
 def test_a_worker_killed_during_the_study_costs_nothing(arches, tmp_path, cluster):
     address, _, workers = cluster
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "blockvis", "sweep", str(arches), "-o", str(out), "--scheduler", address]
-    study = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 120
-    while finished_runs(out) < 4 and study.poll() is None:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    study = _begun(arches, out, address)
     workers[0].kill()
     at_the_kill = finished_runs(out)
     printed, complaint = study.communicate(timeout=120)
@@ -450,12 +456,7 @@ def test_a_worker_killed_during_the_study_costs_nothing(arches, tmp_path, cluste
 def test_a_scheduler_that_goes_away_leaves_the_finished_runs(arches, tmp_path, cluster):
     address, scheduler, _ = cluster
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "blockvis", "sweep", str(arches), "-o", str(out), "--scheduler", address]
-    study = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 120
-    while finished_runs(out) < 3 and study.poll() is None:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    study = _begun(arches, out, address)
     scheduler.kill()
     _, complaint = study.communicate(timeout=120)
     assert study.returncode == 2

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from structures import alike, assembly_of, box, case_from, pixels, rectangle, report_of
+from structures import alike, assembly_of, box, case_from, in_either, pixels, rectangle, report_of
 
 import solver
 from blockvis import draw_still, lay_backfill, run_case
@@ -31,11 +31,7 @@ def down(assembly: solver.Assembly, over: str | list[str], surface: float) -> np
 def test_only_what_sees_the_surface_carries_fill(dimension: int) -> None:
     """A slab under a pier that goes through the surface, and under a beam above it, which hides nothing."""
     boxes = {"slab": (0.0, 0.0, 4.0, 1.0), "pier": (1.0, 1.0, 2.0, 3.0), "beam": (1.0, 3.0, 4.0, 3.5)}
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines([rectangle(*one) for one in boxes.values()], names=list(boxes))
-    else:
-        solids = [box([x0, 0.0, y0], [x1, 1.0, y1]) for x0, y0, x1, y1 in boxes.values()]
-        assembly = solver.Assembly.from_solids(solids, names=list(boxes))
+    assembly = in_either(dimension, [rectangle(*one) for one in boxes.values()], names=list(boxes))
     assert down(assembly, "slab", 2.0) == pytest.approx([3.0 * WEIGHT, 0.0, 0.0])
 
 
@@ -71,12 +67,8 @@ def test_the_load_is_the_column_over_the_place_where_the_block_is() -> None:
 def test_of_a_face_that_rises_through_the_surface_what_is_below_carries_fill(dimension: int) -> None:
     """A slab of 4 × 1 m that turns about its centroid until the right end of its top is above the fill."""
     turn, surface = 0.5, 1.2
-    if dimension == 2:
-        slab = solver.Assembly.from_outlines([rectangle(0.0, 0.0, 4.0, 1.0)])
-        turned = solver.Pose(slab.centroids, np.array([[turn]]))
-    else:
-        slab = solver.Assembly.from_solids([box([0.0, 0.0, 0.0], [4.0, 1.0, 1.0])])
-        turned = solver.Pose(slab.centroids, np.array([[0.0, -turn, 0.0]]))
+    slab = in_either(dimension, [rectangle(0.0, 0.0, 4.0, 1.0)])
+    turned = solver.Pose(slab.centroids, np.array([[turn] if dimension == 2 else [0.0, -turn, 0.0]]))
     load = lay(slab, "*", surface).load(slab, turned)[0]
     left, depth = -2.0 * np.cos(turn) - 0.5 * np.sin(turn), surface - 0.5 + 2.0 * np.sin(turn) - 0.5 * np.cos(turn)
     width = depth / np.tan(turn)
@@ -221,10 +213,7 @@ def test_fill_of_lists_is_that_of_arrays() -> None:
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_an_acceleration_acts_on_the_fill_in_the_middle_of_its_columns(dimension: int) -> None:
     """1 m² or m³ over a block that turned: half of it, as high on average, stands on each half of its top."""
-    if dimension == 2:
-        block = solver.Assembly.from_outlines([rectangle(0.0, 0.0, 1.0, 1.0)])
-    else:
-        block = solver.Assembly.from_solids([box([0, 0, 0], [1, 1, 1])])
+    block = in_either(dimension, [rectangle(0.0, 0.0, 1.0, 1.0)])
     loads = replace(solver.self_weight(block), fills=(lay(block, "*", 2.0, 0.4),))
     along = np.eye(dimension)[0]
     loads = loads.with_acceleration(block, 0.5 * along).with_acceleration(block, -2.0 * along, "dead")

@@ -200,6 +200,7 @@ def test_far_from_the_origin_a_wall_is_filled_as_exactly():
     there = generators.bond(far(WALL), [far(opening) for opening in OPENINGS], brick=(0.5, 0.25))
     assert there.n_blocks == here.n_blocks
     assert np.abs(there.points - here.points - FAR).max() < 1e-8
+    assert all(shape.is_valid for shape in shapes_of(there)), "no corner is there twice"
 
 
 def test_quoins_are_long_and_short_in_turn():
@@ -248,18 +249,6 @@ def test_mortar_is_left_open_between_stones_and_voussoirs(bond, heads):
     pairs = shapely.STRtree(shapes).query(shapes, "dwithin", 0.02).T
     # Where corners of three stones meet they may be nearer than their faces.
     assert min(shapes[i].distance(shapes[j]) for i, j in pairs if i < j) > 0.7 * 0.008
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("bond", "heads"), [("running", "auto"), ("flemish", "arch")])
-def test_stones_far_from_the_origin_have_no_corner_twice(bond, heads):
-    window = arched(1.5, 0.8, 1.0, 0.8, 0.5)
-    wall, opening = (
-        shapely.transform(shape, lambda xy: xy + np.array([123456.7, 5e6]))
-        for shape in (shapely.box(0, 0, 4, 3), window)
-    )
-    layout = generators.bond(wall, [opening], bond=bond, heads=heads, brick=(0.25, 0.1))
-    assert all(shape.is_valid for shape in shapes_of(layout))
 
 
 @pytest.mark.parametrize(

@@ -370,16 +370,6 @@ def test_stones_end_where_an_uneven_ground_begins():
     assert np.array_equal(closed[45], np.array(ground))
 
 
-@pytest.mark.thorough
-def test_supports_stay_and_stones_come_to_them():
-    stones = rubble(2)
-    ground = [np.array(support["outline"]) for support in GROUND]
-    still = np.arange(len(stones) + 2) >= len(stones)
-    closed = share_out([*stones, *ground], 0.04, still)
-    assert (closed[-1] == ground[1]).all()
-    assert min(ring[:, 1].min() for ring in closed[:-2]) == pytest.approx(0.0, abs=1e-12)
-
-
 def test_an_opening_stays_open():
     def box(x, y, w, h):
         return ring_of(shapely.box(x, y, x + w, y + h).buffer(-0.02).buffer(0.02, quad_segs=4))

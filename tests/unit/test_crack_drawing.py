@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from structures import arch_response, box, pixels, posed, rectangle
+from structures import arch_response, box, in_either, pixels, posed, rectangle
 
 import solver
 from blockvis.pictures import crack_drawing, palette
@@ -218,10 +218,7 @@ def test_a_step_in_the_plane_is_said(tmp_path, words):
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_step_is_said_though_it_is_part_of_a_crack(tmp_path, words, dimension):
     """Two blocks past each other by 250 mm and open by 5 are a crack of 5 mm, in the plane as in space."""
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines([rectangle(-1, 0, 0, 1), rectangle(0, 0, 1, 1)])
-    else:
-        assembly = solver.Assembly.from_solids([box((-1, 0, 0), (0, 1, 1)), box((0, 0, 0), (1, 1, 1))])
+    assembly = in_either(dimension, [rectangle(-1, 0, 0, 1), rectangle(0, 0, 1, 1)])
     pose = solver.Pose.initial(assembly)
     pose.positions[1, [0, -1]] += 0.005, -0.25
     draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)

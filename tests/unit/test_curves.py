@@ -60,15 +60,6 @@ def said(response, path):
 
 
 @pytest.mark.thorough
-def test_the_curve_names_the_failure_of_a_run(tmp_path):
-    response = arch_response()
-    failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path[:4])
-    told = said(failed, tmp_path / "failed.svg")
-    assert "solver failed at 60.00 mm: the curve is not complete" in told
-    assert not any("failed" in line for line in said(response, tmp_path / "whole.svg"))
-
-
-@pytest.mark.thorough
 def test_names_of_case_and_ties_are_text_whatever_they_hold_and_long_ones_are_broken(tmp_path):
     """No formula between two "$", also in the legend where it begins with "_"; a long one hid where the lines are."""
     name = "tie in the middle of the northern arcade, 24 mm across, installed in 1897"

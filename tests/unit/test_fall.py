@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise, permutations
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import pytest
 import pyvista as pv
 import shapely
 from scipy.integrate import solve_ivp
-from structures import arch_response, box, parted, pixels, rectangle, report_of, wall
+from structures import arch_response, box, in_either, parted, pixels, rectangle, report_of, wall
 
 import blockvis
 import solver
@@ -37,31 +37,13 @@ def shipped_arch():
 
 
 @cache
-def panel():
-    """A panel in running bond on a support that tilts, until it slides and turns over."""
-    outlines = []
-    for course in range(6):
-        joints = [0.0, 0.25, 0.5, 0.75] if course % 2 == 0 else [0.0, 0.125, 0.375, 0.625, 0.75]
-        low, high = 0.1 * course, 0.1 * course + 0.1
-        outlines += [[[a, low], [b, low], [b, high], [a, high]] for a, b in pairwise(joints)]
-    outlines.append([[-0.5, -0.3], [1.25, -0.3], [1.25, 0.0], [-0.5, 0.0]])
-    roles = ["free"] * (len(outlines) - 1) + ["moving"]
-    tilt = solver.Settlement(rotation_centre=(0.75, 0.0), rotation=-1.0, increment=0.05, limit=1.5)
-    assembly = solver.Assembly.from_outlines(outlines, roles=roles)
-    return solver.settle(assembly, tilt, friction_coefficient=0.9, controls=solver.Controls(falling_frames=1))
-
-
-@cache
-def fallen(structure):
-    return fall_of(structure())
+def fallen():
+    return fall_of(shipped_arch())
 
 
 def outlines(assembly, pose):
     corners = mechanics.moved_vertices(assembly, pose)
     return np.array([shapely.Polygon(ring) for ring in np.split(corners, assembly.offsets[1:-1])])
-
-
-EACH = pytest.mark.parametrize("structure", [shipped_arch, pytest.param(panel, marks=pytest.mark.thorough)])
 
 
 @pytest.mark.slow
@@ -82,11 +64,7 @@ def test_a_lintel_falls_to_the_floor_whether_its_abutments_are_taller_or_wider(w
     rectangles = [(0, 0, 2, 0.4), (0.2 - width, -3, 0.2, 0), (1.8, -3, 1.8 + width, 0), (-4, -3.5, 6, -3)]
     rectangles += [(0.9, -9, 1.1, -3.5)]
     roles, removed = ["free", "fixed", "moving", "fixed", "fixed"], np.arange(5) == 4
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines([rectangle(*at) for at in rectangles], roles=roles)
-    else:
-        solids = [box((x0, 0.0, z0), (x1, 0.5, z1)) for x0, z0, x1, z1 in rectangles]
-        assembly = solver.Assembly.from_solids(solids, roles=roles)
+    assembly = in_either(dimension, [rectangle(*at) for at in rectangles], roles=roles)
     height, _ = ground_below(assembly, solver.Pose.initial(assembly), removed)
     assert height == pytest.approx(-3.0, abs=2e-3)
 
@@ -173,9 +151,8 @@ def test_what_collapses_onto_the_ground_at_once_is_said_to_rest():
 
 
 @pytest.mark.slow
-@EACH
-def test_blocks_never_overlap_by_a_hundredth(structure):
-    response, fall = structure(), fallen(structure)
+def test_blocks_never_overlap_by_a_hundredth():
+    response, fall = shipped_arch(), fallen()
     assembly = response.assembly
     for k in range(len(fall)):
         blocks = outlines(assembly, fall.pose(k))
@@ -188,9 +165,8 @@ def test_blocks_never_overlap_by_a_hundredth(structure):
 
 
 @pytest.mark.slow
-@EACH
-def test_blocks_come_to_rest_on_something(structure):
-    response, fall = structure(), fallen(structure)
+def test_blocks_come_to_rest_on_something():
+    response, fall = shipped_arch(), fallen()
     assembly = response.assembly
     assert not len(fall_module.still_moving(assembly, fall))
     np.testing.assert_allclose(fall.positions[-1], fall.positions[-2], atol=1e-3 * assembly.block_size)
@@ -207,7 +183,7 @@ def test_blocks_come_to_rest_on_something(structure):
 
 @pytest.mark.slow
 def test_the_first_push_is_that_of_the_mechanism():
-    response, fall = shipped_arch(), fallen(shipped_arch)
+    response, fall = shipped_arch(), fallen()
     moved = (fall.positions[1] - fall.positions[0])[response.assembly.free]
     pushed = response.collapse.mechanism[response.assembly.free, :2]
     assert (moved * pushed).sum() > 0.9 * np.linalg.norm(moved) * np.linalg.norm(pushed)
@@ -253,10 +229,7 @@ def test_a_block_in_flight_turns_ever_faster_by_its_moment_and_falls_no_slower(d
     """It slides off a ledge that is drawn away below it, and keeps a moment of 200 N·m."""
     drawn = [(0.0, 0.0, 1.0, 0.4), (-1.0, -0.5, 0.55, 0.0), (-0.5, 0.05, 0.0, 0.4), (-9.0, -20.0, 9.0, -19.0)]
     roles, moment = ["free", "moving", "fixed", "fixed"], -200.0 if dimension == 2 else 200.0
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines([rectangle(*at) for at in drawn], roles=roles)
-    else:
-        assembly = solver.Assembly.from_solids([box((a, 0, b), (c, 1, d)) for a, b, c, d in drawn], roles=roles)
+    assembly = in_either(dimension, [rectangle(*at) for at in drawn], roles=roles)
     loads = solver.self_weight(assembly)
     loads.dead[0, 2 * dimension - 2] = moment
     away = solver.Settlement(direction=(-1, *[0] * (dimension - 1)), increment=0.02, limit=0.5, tolerance=1e-3)
@@ -371,17 +344,17 @@ def test_the_push_grows_until_what_still_stands_falls_whatever_was_lost_before()
 @pytest.mark.slow
 def test_the_same_bytes_twice(tmp_path):
     response = shipped_arch()
-    for name, fall in (("one", fallen(shipped_arch)), ("two", fall_of(response))):
+    for name, fall in (("one", fallen()), ("two", fall_of(response))):
         write_fall(fall, response, tmp_path / name)
     files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file())
-    assert len(files) == len(fallen(shipped_arch)) + 2
+    assert len(files) == len(fallen()) + 2
     for file in files:
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
 
 
 @pytest.mark.slow
 def test_files_have_the_time_as_their_parameter(tmp_path):
-    response, fall = shipped_arch(), fallen(shipped_arch)
+    response, fall = shipped_arch(), fallen()
     write_fall(fall, response, tmp_path)
     reader = pv.PVDReader(tmp_path / "fall.pvd")
     assert reader.time_values == pytest.approx(list(fall.times))
@@ -459,7 +432,7 @@ def test_friction_of_each_pair_of_materials():
 
 @pytest.mark.slow
 def test_the_page_plays_the_fall_in_real_time():
-    response, fall = shipped_arch(), fallen(shipped_arch)
+    response, fall = shipped_arch(), fallen()
     page = report_of(response, fall=fall)
     assert page.count(CAPTION) == len(fall) - 1
     assert CAPTION not in report_of(response)
@@ -797,7 +770,7 @@ def test_a_block_in_space_swings_on_a_tie():
 def test_results_that_replace_those_of_a_collapse_have_no_fall(tmp_path):
     response = shipped_arch()
     folder = blockvis.write(response, tmp_path / "out")
-    write_fall(fallen(shipped_arch), response, folder)
+    write_fall(fallen(), response, folder)
     stands = replace(response, increments=response.path, stop=solver.Status.LIMIT_REACHED, collapse=None)
     blockvis.write(stands, folder, overwrite=True)
     assert not list(folder.glob("fall*"))

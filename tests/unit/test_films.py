@@ -62,6 +62,15 @@ def sideways_block(steps=3):
     return solver.pushover(assembly, control, loads=loads, friction_coefficient=2.0)
 
 
+def told_by_film(response, seconds):
+    """What is drawn in each frame: its state and the words upon it."""
+    drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
+    told = []
+    drawer.picture = lambda state, badge=None: told.append((state, badge))
+    list(film_of(drawer, 10.0, seconds))
+    return told
+
+
 @pytest.mark.parametrize(("seconds", "frames"), [(4.0, [10, 20, 10]), (1.0, [10, 10, 10]), (0.5, [5, 5, 5])])
 @pytest.mark.slow
 def test_a_short_phase_takes_a_second_of_the_film(seconds, frames):
@@ -82,11 +91,7 @@ def test_a_short_phase_takes_a_second_of_the_film(seconds, frames):
 @pytest.mark.slow
 def test_a_film_tells_what_is_lost_and_goes_on():
     response = dropped_brick(0.05)
-    shown = response.path
-    drawer = Drawer(response, Look(forces="none"), SIZE, shown)
-    told = []
-    drawer.picture = lambda state, badge=None: told.append((state.parameter, badge, bool(state.fallen.any())))
-    list(film_of(drawer, 10.0, 3.0))
+    told = [(state.parameter, badge, bool(state.fallen.any())) for state, badge in told_by_film(response, 3.0)]
     gone = response.losses[0].settlement
     named = [parameter for parameter, badge, _ in told if badge == "LOST · brick"]
     assert len(named) == 10
@@ -107,10 +112,7 @@ def test_a_film_tells_what_is_taken_away_between_settlements():
     down = solver.Settlement((0, -1), increment=0.01, limit=0.01)
     change = solver.PhaseChange(1, np.array([False, False, False, True]))
     response = solver.Structure(assembly, friction_coefficient=0.6).settle([down, down], changes=[change])
-    drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
-    told = []
-    drawer.picture = lambda state, badge=None: told.append((badge, bool(state.removed.any())))
-    list(film_of(drawer, 10.0, 4.0))
+    told = [(badge, bool(state.removed.any())) for state, badge in told_by_film(response, 4.0)]
     first = next(k for k, (badge, _) in enumerate(told) if badge)
     assert told[first : first + 10] == [(f"TAKEN AWAY · {assembly.names[3]}", True)] * 10
     assert {badge for badge, _ in told[:first] + told[first + 10 :]} == {None}
@@ -131,11 +133,10 @@ def test_a_film_tells_what_is_taken_away_apart_from_what_falls_with_it():
     change = solver.PhaseChange(1, np.arange(6) == 3)
     response = solver.Structure(assembly, friction_coefficient=0.6).settle([down, down], changes=[change])
     assert response.path[-1].fallen.sum() == 3
-    drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
-    told = []
-    drawer.picture = lambda state, badge=None: told.append(badge)
-    list(film_of(drawer, 10.0, 4.0))
-    assert set(told) == {None, f"TAKEN AWAY · {assembly.names[3]}; LOST · 2 blocks"}
+    assert {badge for _, badge in told_by_film(response, 4.0)} == {
+        None,
+        f"TAKEN AWAY · {assembly.names[3]}; LOST · 2 blocks",
+    }
 
 
 @pytest.mark.thorough

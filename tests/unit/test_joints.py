@@ -10,8 +10,8 @@ import pyvista as pv
 from structures import (
     BENT,
     arch_response,
-    box,
     dropped_brick,
+    in_either,
     moved_and_turned,
     parted,
     posed,
@@ -333,11 +333,7 @@ def taken_away_before_a_settlement(dimension):
     """Two stones side by side, the right one with a third on it until that is taken away, on a support that sinks."""
     places = [(-1, -0.5, 1, 0), (1, -0.5, 3, 0), (-1, 0, 1, 0.5), (1, 0, 3, 0.5), (2, 0.5, 3, 1)]
     given = {"names": ["L", "R", "l", "r", "x"], "roles": ["fixed", "moving", "free", "free", "free"]}
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines([rectangle(*place) for place in places], **given)
-    else:
-        solids = [box((left, 0, low), (right, 1, high)) for left, low, right, high in places]
-        assembly = solver.Assembly.from_solids(solids, **given)
+    assembly = in_either(dimension, [rectangle(*place) for place in places], **given)
     settlement = solver.Settlement([0.0] * (dimension - 1) + [-1.0], increment=0.05, limit=0.05)
     change = solver.PhaseChange(1, removed=[False] * 4 + [True])
     return solver.Structure(assembly, solver.Interfaces(solver.InterfaceLaw(0.6))).settle(

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from structures import prism, rectangle, upright
+from structures import in_either, prism, rectangle
 
 import solver
 from blockvis import generators
@@ -70,10 +70,7 @@ def test_without_dilatancy_a_block_on_a_slope_carries_any_weight_below_its_angle
     angle = np.radians(20.0)
     along, out = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     shapes = [[along * x + out * y for x, y in corners] for corners in (rectangle(0.0, 0.0, 1.0, 0.4), GROUND)]
-    if dimension == 3:
-        assembly = solver.Assembly.from_solids([prism(shape) for shape in shapes], roles=["free", "fixed"])
-    else:
-        assembly = solver.Assembly.from_outlines(shapes, roles=["free", "fixed"])
+    assembly = in_either(dimension, shapes, prism, roles=["free", "fixed"])
     down = solver.weight_fraction(assembly, (0.0, -1.0, 0.0)[:dimension], np.array([0]))
     for flow in ("associative", "non-associative"):
         limit = limit_load(assembly, loads=solver.Loads(down, down), friction_coefficient=friction, flow=flow)
@@ -325,10 +322,7 @@ def test_what_locks_slowly_is_unbounded(stones, forces, friction, in_space, mirr
     outlines = [rectangle(-1.0, -0.2, 2.0, 0.0), *(rectangle(*stone) for stone in stones)]
     outlines = [(np.array(outline) * [mirror, 1])[::mirror] for outline in outlines]
     roles = ["fixed"] + ["free"] * len(stones)
-    if in_space:
-        assembly = solver.Assembly.from_solids([upright(outline, 0.0, 1.0) for outline in outlines], roles=roles)
-    else:
-        assembly = solver.Assembly.from_outlines(outlines, roles=roles, thickness=1.0)
+    assembly = in_either(3 if in_space else 2, outlines, roles=roles)
     live = np.zeros((assembly.n_blocks, 6 if in_space else 3))
     live[1:, [0, 2 if in_space else 1]] = np.array(forces) * [mirror, 1]
     found = solver.limit_load(

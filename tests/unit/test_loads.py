@@ -197,6 +197,7 @@ def test_friction_given_in_degrees_warns():
             "one of the fills is 'fill'; give solver.Backfill",
         ),
         (lambda: solver.Interfaces(scatter=0.1), r"scatter of interfaces is 0\.1; give solver\.JointScatter"),
+        (lambda: solver.settle(ASSEMBLY, [PUSH, 1.0]), r"one of the settlements is 1\.0; give solver\.Settlement"),
         (lambda: solver.settle(ASSEMBLY, None), r"direction is \(None,\); give a sequence of numbers"),
         (
             lambda: solver.settle(ASSEMBLY, (1, 0), friction_coefficient=0.3, interfaces=solver.Interfaces()),

@@ -90,43 +90,6 @@ def test_zero_capacity_does_not_depend_on_the_increment():
 
 
 @pytest.mark.thorough
-def test_a_wall_that_rocks_does_not_depend_on_the_increment():
-    outlines = []
-    for course in range(4):
-        edges = [0.0, 0.4, 0.8, 1.2] if course % 2 else [0.0, 0.2, 0.6, 1.0, 1.2]
-        low, high = 0.2 * course, 0.2 * course + 0.2
-        outlines += [[[a, low], [b, low], [b, high], [a, high]] for a, b in pairwise(edges)]
-    outlines.append([[0, -0.1], [1.2, -0.1], [1.2, 0], [0, 0]])
-    wall = solver.Assembly.from_outlines(outlines, roles=["free"] * 14 + ["fixed"])
-    curves = []
-    for increment in (0.02, 0.01):
-        control = solver.ControlDisplacement(wall.names[13], (1, 0), increment=increment, limit=0.1)
-        response = pushover(wall, control, loads=sideways(wall), friction_coefficient=5.0)
-        multipliers = [i.load_multiplier for i in response.path]
-        curves.append(np.interp([0.0, 0.03, 0.06, 0.1], response.settlement, multipliers))
-    assert curves[0] == pytest.approx(curves[1], rel=1e-3)
-    assert curves[0][-1] < 0.95 * curves[0][0]
-
-
-@pytest.mark.thorough
-def test_pushed_only_so_far_it_keeps_capacity():
-    assembly = block()
-    control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.095)
-    seen = []
-    response = pushover(assembly, control, loads=sideways(assembly), on_increment=seen.append)
-    assert response.stop is solver.Status.LIMIT_REACHED
-    assert response.settlement == pytest.approx([*(0.01 * np.arange(10)), 0.095], abs=1e-9)
-    assert response.path[-1].load_multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(0.095)), abs=1e-6)
-    assert len(seen) == len(response.increments)
-    weight = mechanics.total_weight(assembly)
-    assert response.reaction == pytest.approx([i.load_multiplier * weight for i in response.path])
-    # Going on from there gives the same curve, its displacement counted anew.
-    again = pushover(assembly, control, loads=sideways(assembly), pose=response.path[-1].pose)
-    expected = np.tan(np.arctan(0.2) - np.arcsin(0.095 + again.settlement))
-    assert [i.load_multiplier for i in again.path] == pytest.approx(expected, abs=1e-6)
-
-
-@pytest.mark.thorough
 def test_of_multipliers_that_are_equal_but_for_rounding_the_first_is_the_largest(tmp_path):
     control = solver.ControlDisplacement("block", increment=0.01, limit=0.02)
     response = pushover(block(), control, loads=sideways(block()), friction_coefficient=0.1)
@@ -141,8 +104,9 @@ def test_of_multipliers_that_are_equal_but_for_rounding_the_first_is_the_largest
 def test_what_has_fallen_is_marked():
     assembly = block()
     control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.05)
-    controls = solver.Controls(falling_frames=7)
-    response = pushover(assembly, control, loads=sideways(assembly), controls=controls)
+    controls, seen = solver.Controls(falling_frames=7), []
+    response = pushover(assembly, control, loads=sideways(assembly), controls=controls, on_increment=seen.append)
+    assert tuple(seen) == response.increments
     falling = [i for i in response.increments if i.status is solver.Status.FALLING]
     assert 0 < len(falling) <= 7
     assert falling[-1].pose.rotations[0, 0] < falling[0].pose.rotations[0, 0] < -0.19

@@ -66,8 +66,6 @@ def hatch_with_hole(space):
     ],
 )
 def test_what_is_no_block_is_left_out_with_a_note(tmp_path, extra, note):
-    import re
-
     drawing = read_layout(drawn(tmp_path, extra))
     assert drawing.n_blocks == 16
     assert [words for words in drawing.notes if re.match(note, words)], drawing.notes

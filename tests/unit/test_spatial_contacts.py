@@ -1,56 +1,22 @@
 """Contact points in space where it is difficult: other descriptions, tips and ridges, drawings a little off."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 from scipy.spatial import HalfspaceIntersection
-from structures import box, hull_of, of_cubes, turn_by
+from structures import box, hull_of, layout_of, of_cubes, turn_by
 
 import solver
 from blockvis import generators
 from solver import mechanics
 
 
-def corner_of_walls(bricks=3, courses=4, length=0.25, height=0.08):
-    """Two walls that meet at a corner where headers and stretchers alternate, on one slab."""
-    t = length / 2
-    long = bricks * length
-    solids = [box((-0.1, -0.1, -height), (long + 0.1, long + 0.1, 0.0))]
-    for course in range(courses):
-        z, w = course * height, (course + 1) * height
-        first, second = (0.0, t) if course % 2 == 0 else (t, 0.0)
-        for start, across in ((first, True), (second, False)):
-            joints = [start, *(start + length * k for k in range(1, bricks) if start + length * k < long - 1e-9), long]
-            for a, b in pairwise(joints):
-                solids.append(box((a, 0, z), (b, t, w)) if across else box((0, a, z), (t, b, w)))
-    return solids
+def dome():
+    return layout_of(generators.dome(lunes=10, courses=5, thickness_ratio=0.15, cap=15.0)).solids
 
 
-def dome(lunes=10, courses=5, thickness=0.15):
-    """A hemisphere of stones under a polygonal cap, on a ring of supports."""
-    inner, outer = 1 - thickness / 2, 1 + thickness / 2
-    polar, around = np.radians(np.linspace(15, 90, courses + 1)), 2 * np.pi * np.arange(lunes) / lunes
-
-    def place(radius, k, m):
-        direction = [
-            np.sin(polar[k]) * np.cos(around[m % lunes]),
-            np.sin(polar[k]) * np.sin(around[m % lunes]),
-            np.cos(polar[k]),
-        ]
-        return radius * np.array(direction)
-
-    solids = [hull_of(np.array([place(r, 0, m) for r in (inner, outer) for m in range(lunes)]))]
-    for k in range(courses):
-        for m in range(lunes):
-            solids.append(
-                hull_of(np.array([place(r, k + p, m + q) for r in (inner, outer) for p in (0, 1) for q in (0, 1)]))
-            )
-    for m in range(lunes):
-        ring = np.array([place(r, courses, m + q) for r in (inner, outer) for q in (0, 1)])
-        solids.append(hull_of(np.concatenate([ring, ring - [0, 0, 0.1]])))
-    return solids
+#: Two walls that meet where headers and stretchers alternate, and a hemisphere under a polygonal cap.
+STRUCTURES = {"corner": lambda: layout_of(generators.l_corner(bricks=3, across=3, courses=4)).solids, "dome": dome}
 
 
 def found(solids, reach=0.01):
@@ -74,9 +40,6 @@ def table(contacts, number=None, turn=None):
         ]
     )
     return rows[np.lexsort(np.round(rows[:, ::-1], 5).T)]
-
-
-STRUCTURES = {"corner": corner_of_walls, "dome": dome}
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from structures import alike, box, case_from, drawn, pixels, prism, rectangle, run_command
+from structures import alike, box, case_from, drawn, in_either, pixels, prism, rectangle, run_command
 
 import blockvis
 import solver
@@ -76,10 +76,7 @@ def test_a_block_glued_between_two_walls_that_is_pushed_at_one_of_them_locks_unt
     """What the push presses adds more friction than it needs; off the other wall alone it pulled, and slipped."""
     shapes = [rectangle(*at) for at in ((0, 0, 1, 0.5), (-1, -1, 0, 2), (1, -1, 2, 2))]
     roles, down, push = ["free", "fixed", "fixed"], (0.0, -1.0, 0.0)[:dimension], (1.0, -0.3, 0.0)[:dimension]
-    if dimension == 3:
-        assembly = solver.Assembly.from_solids([prism(shape) for shape in shapes], roles=roles)
-    else:
-        assembly = solver.Assembly.from_outlines(shapes, roles=roles)
+    assembly = in_either(dimension, shapes, prism, roles=roles)
     loads = solver.Loads(*(solver.weight_fraction(assembly, of, [0]) for of in (down, push)))
     law = solver.InterfaceLaw(1.0, 1e4, strength, tensile_strength=tension)
     structure = solver.Structure(assembly, solver.Interfaces(law), loads)
@@ -285,10 +282,7 @@ def stone_on_a_bed(width, dimension, up, **law):
     if not width:
         x, y = x[[0, 1, 3]], y[[0, 1, 3]]
     outlines = [[*np.column_stack([x, y]), (0.5, 1.0), (-0.5, 1.0)], rectangle(-2.0, -0.5, 2.0, 0.0)]
-    if dimension == 2:
-        assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed"])
-    else:
-        assembly = solver.Assembly.from_solids([prism(outline) for outline in outlines], roles=["free", "fixed"])
+    assembly = in_either(dimension, outlines, prism, roles=["free", "fixed"])
     live = np.zeros_like(solver.weight_fraction(assembly, np.zeros(dimension)))
     live[0, 1] = 1e5 if up else -1e5
     # Above the corner or the middle of the bed.

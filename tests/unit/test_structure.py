@@ -241,12 +241,6 @@ def test_factors_of_friction_that_are_none_are_refused(block, factor, told):
         structure.limit_load(acceleration=(1, 0))
 
 
-def test_numbers_among_settlements_are_refused(block):
-    settlements = [solver.Settlement(direction=(0, -1), limit=0.02), 1.0, -1.0]
-    with pytest.raises(TypeError, match=r"one of the settlements is 1\.0; give solver\.Settlement"):
-        solver.settle(block, settlements)
-
-
 def test_a_pose_of_other_blocks_is_refused(block):
     structure = solver.Structure(block, friction_coefficient=0.5)
     pose = solver.Pose.initial(generators.arch())

@@ -66,6 +66,19 @@ def _with(study_file, old, new):
     return study_file
 
 
+def _added(file, text):
+    """What is given stands below in the file."""
+    file.write_text(file.read_text(encoding="utf-8") + text, encoding="utf-8")
+
+
+def _refused(study_file, capsys, *options):
+    """The message of a study of which nothing is started."""
+    out = study_file.parent / "out"
+    assert main(["sweep", str(study_file), "-o", str(out), *options]) == 2
+    assert not out.exists()
+    return capsys.readouterr().err
+
+
 def test_paths_lead_into_tables_lists_and_quoted_names():
     values = {"supports": [{"outline": [[0, 0], [1, 0]]}], "settlement": {"direction": [1, 0]}}
     put(values, parse_path("supports[0].outline[1][0]"), 2.5)
@@ -99,8 +112,7 @@ def test_paths_that_lead_nowhere(path, words):
 
 def test_every_run_is_a_case_with_its_values_and_its_seed(study_file):
     _with(study_file, "[parameters]\n", '[parameters]\n"geometry.parameters.voussoirs" = [8, 9]\n')
-    with open(study_file, "a", encoding="utf-8") as file:
-        file.write('[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\ndeviation = 0.002\n')
+    _added(study_file, '[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\ndeviation = 0.002\n')
     study = read_study(study_file)
     cases = [case_of(study.values_of(run), study.case_source) for run in range(study.n_runs)]
     assert sorted({c.parameters["voussoirs"] for c in cases}) == [8, 9]
@@ -118,8 +130,7 @@ def test_imperfections_of_the_case_keep_their_seed(study_file, tmp_path):
         CASE + '[[imperfections]]\nkind = "density"\ndistribution = "lognormal"\ndeviation = 0.1\nseed = 77\n',
         encoding="utf-8",
     )
-    with open(study_file, "a", encoding="utf-8") as file:
-        file.write('[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n')
+    _added(study_file, '[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n')
     study = read_study(study_file)
     found = [case_of(study.values_of(run), study.case_source).imperfections for run in (0, 1)]
     assert [one.kind for one in found[0]] == ["density", "friction"]
@@ -135,16 +146,17 @@ def test_imperfections_of_the_case_keep_their_seed(study_file, tmp_path):
 
 
 def test_a_case_with_one_table_of_imperfections_is_studied(study_file, tmp_path):
-    with open(tmp_path / "case.toml", "a", encoding="utf-8") as file:
-        file.write('[imperfections]\nkind = "density"\ndistribution = "lognormal"\ndeviation = 0.1\nseed = 77\n')
+    _added(
+        tmp_path / "case.toml",
+        '[imperfections]\nkind = "density"\ndistribution = "lognormal"\ndeviation = 0.1\nseed = 77\n',
+    )
     study = read_study(study_file)
     assert [case_of(study.values_of(run), study.case_source).imperfections[0].seed for run in (0, 1)] == [77, 77]
 
 
 def test_a_parameter_may_be_a_number_of_an_imperfection(study_file):
     _with(study_file, "[parameters]\n", '[parameters]\n"imperfections[0].deviation" = [0.001, 0.004]\n')
-    with open(study_file, "a", encoding="utf-8") as file:
-        file.write('[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\ndeviation = 0.002\n')
+    _added(study_file, '[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\ndeviation = 0.002\n')
     study = read_study(study_file)
     found = {
         case_of(study.values_of(r), study.case_source).imperfections[0].distribution.numbers["deviation"]
@@ -169,8 +181,7 @@ def test_sobol_sequence_is_balanced():
 def test_grid_takes_every_combination_and_repeats_with_other_seeds(study_file):
     _with(study_file, 'method = "latin hypercube"\nruns = 8\n', 'method = "grid"\nrepeats = 2\n')
     _with(study_file, "upper = 0.8 }", 'upper = 0.8, points = 4 }\n"geometry.parameters.voussoirs" = [8, 9, 10]')
-    with open(study_file, "a", encoding="utf-8") as file:
-        file.write('[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\ndeviation = 0.002\n')
+    _added(study_file, '[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\ndeviation = 0.002\n')
     study = read_study(study_file)
     points = [tuple(study.point(run).values()) for run in range(study.n_runs)]
     assert len(points) == 24
@@ -248,18 +259,14 @@ def test_a_study_does_not_hang_on_its_first_run(study_file, capsys):
     study_file.write_text(f"{text}[parameters]\n{values}", encoding="utf-8")
     assert read_study(study_file).n_runs == 6
     _with(study_file, "[1, 8, 9]", "[1, 0]")
-    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
-    assert "run 0 cannot be built, nor can others of the study: " in capsys.readouterr().err
+    assert "run 0 cannot be built, nor can others of the study: " in _refused(study_file, capsys)
 
 
 def test_imperfections_of_a_kind_that_the_case_has_are_refused_by_the_study(study_file, capsys):
     more = '[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n'
-    with open(study_file.parent / "case.toml", "a", encoding="utf-8") as file:
-        file.write(f"{more}seed = 1\n")
-    with open(study_file, "a", encoding="utf-8") as file:
-        file.write(more)
-    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
-    said = capsys.readouterr().err
+    _added(study_file.parent / "case.toml", f"{more}seed = 1\n")
+    _added(study_file, more)
+    said = _refused(study_file, capsys)
     assert "study.toml: with its [[imperfections]] behind those of the case, " in said
     assert "[imperfections 2] kind 'friction' is there twice" in said
 
@@ -267,8 +274,7 @@ def test_imperfections_of_a_kind_that_the_case_has_are_refused_by_the_study(stud
 def test_settlements_in_m_and_in_rad_are_no_study(study_file, capsys):
     turn = "[[settlement]]\nrotation_centre = [1.0, 0.0]\nincrement = 0.001\nlimit = 0.002\n"
     (study_file.parent / "case.toml").write_text(CASE + turn, encoding="utf-8")
-    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
-    message = capsys.readouterr().err
+    message = _refused(study_file, capsys)
     assert "settlement 1 of run 0 (" in message
     assert ") is in m and settlement 2 of run 0 (" in message
     assert ") is in rad; leave out those of one" in message
@@ -278,24 +284,18 @@ def test_runs_in_m_and_in_rad_are_no_study(study_file, capsys):
     tables = "{direction = [1.0, 0.0], limit = 0.1}, {rotation = 1.0, rotation_centre = [1.0, 0.0], limit = 0.1}"
     study = f'[study]\ncase = "case.toml"\n[parameters]\nsettlement = [{tables}]\n'
     study_file.write_text(study, encoding="utf-8")
-    out = study_file.parent / "out"
-    assert main(["sweep", str(study_file), "-o", str(out)]) == 2
-    message = capsys.readouterr().err
+    message = _refused(study_file, capsys)
     assert "(settlement = {'direction': [1.0, 0.0], 'limit': 0.1}) is in m and settlement 1 of run " in message
     assert "(settlement = {'rotation': 1.0," in message
-    assert not out.exists()
 
 
 @pytest.mark.parametrize(("old", "new", "words"), BAD, ids=[b[1][:24] for b in BAD])
 def test_bad_input_is_one_message_and_nothing_started(study_file, capsys, old, new, words):
     _with(study_file, old, new)
-    out = study_file.parent / "out"
-    assert main(["sweep", str(study_file), "-o", str(out)]) == 2
-    message = capsys.readouterr().err
+    message = _refused(study_file, capsys)
     assert message.count("\n") == 1, message
     for word in ("study.toml", *words):
         assert word in message
-    assert not out.exists()
 
 
 def test_nothing_varied_is_refused(tmp_path):
@@ -307,12 +307,9 @@ def test_nothing_varied_is_refused(tmp_path):
 @pytest.mark.slow
 def test_an_unreachable_scheduler_is_one_message_and_nothing_started(study_file, capsys, monkeypatch):
     monkeypatch.setattr(campaign, "ANSWER", 0.5)
-    out = study_file.parent / "out"
-    assert main(["sweep", str(study_file), "-o", str(out), "--scheduler", "tcp://127.0.0.1:9"]) == 2
-    message = capsys.readouterr().err
+    message = _refused(study_file, capsys, "--scheduler", "tcp://127.0.0.1:9")
     assert "no Dask scheduler answers at 'tcp://127.0.0.1:9'" in message
     assert "dask scheduler" in message
-    assert not out.exists()
 
 
 @pytest.mark.parametrize(
@@ -773,7 +770,6 @@ def test_kinds_that_collapse_at_other_numbers_are_no_study(study_file, capsys):
     study_file.write_text(
         '[study]\ncase = "case.toml"\n[parameters]\n"analysis.kind" = ["settlement", "limit load"]\n', encoding="utf-8"
     )
-    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
-    said = capsys.readouterr().err
+    said = _refused(study_file, capsys)
     assert re.search(r"load multiplier 1 of run \d+ \(analysis.kind = 'limit load'\) is without unit", said)
     assert "(analysis.kind = 'settlement') is in m" in said

@@ -28,7 +28,7 @@ WHITE_BOX = {
     "system/test_path_range.py": 11,
     "system/test_report_use.py": 5,
     "system/test_results_in_space.py": 16,
-    "system/test_step_check.py": 8,
+    "system/test_step_check.py": 7,
     "system/test_study_campaign.py": 10,
     "unit/test_case_keys.py": 7,
     "unit/test_closed_joints.py": 11,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from structures import box, upright
+from structures import box, in_either
 
 import solver
 from blockvis import generators, lay_backfill
@@ -24,9 +24,7 @@ def mirrored(outline: np.ndarray) -> np.ndarray:
 def two_block_arch(dimension: int) -> solver.Assembly:
     outlines = [HALF, mirrored(HALF), GROUND, mirrored(GROUND)]
     labels = {"names": ["left half", "right half", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
-    if dimension == 2:
-        return solver.Assembly.from_outlines(outlines, density=DENSITY, **labels)
-    return solver.Assembly.from_solids([upright(outline, 0.0, 1.0) for outline in outlines], density=DENSITY, **labels)
+    return in_either(dimension, outlines, density=DENSITY, **labels)
 
 
 def under(assembly: solver.Assembly, fill: solver.Backfill) -> solver.Loads:
@@ -140,14 +138,3 @@ def test_in_space_an_acceleration_acts_on_the_fill_along_a_pushover() -> None:
     for increment in structure.pushover(control).path:
         lean = -float(increment.pose.rotations[0, 0])
         assert increment.measured == pytest.approx(multiplier_by_hand(lean), abs=1e-5)
-
-
-@pytest.mark.thorough
-def test_a_pushover_under_fill_is_that_of_a_block_by_hand() -> None:
-    control = solver.ControlDisplacement("block", point=(0.5, 1.0), increment=0.2, limit=0.2)
-    response = filled_block().pushover(control)
-    assert len(response.path) == 2
-    for increment in response.path:
-        lean = -float(increment.pose.rotations[0, 0])
-        assert turned_by(lean, [0.5, 1.0])[0] + 0.5 == pytest.approx(increment.parameter, abs=1e-5)
-        assert increment.measured == pytest.approx(multiplier_by_hand(lean), abs=1e-6)

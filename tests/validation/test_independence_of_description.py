@@ -23,8 +23,6 @@ WALLS = {
 }
 EACH_WALL = pytest.mark.parametrize("name", ["panel", pytest.param("wall with a door", marks=pytest.mark.slow)])
 
-QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
-
 
 @cache
 def wall(name):
@@ -55,14 +53,6 @@ def as_drawn(name):
     return response.settlement, response.reaction / response.total_weight
 
 
-def turned(name):
-    assembly = described(wall(name), lambda outline: outline @ QUARTER_TURN.T)
-    dead = np.zeros((assembly.n_blocks, 3))
-    dead[:, 0] = assembly.masses * solver.GRAVITY
-    loads = solver.Loads(dead, np.zeros_like(dead))
-    return sinking(assembly, direction=(1.0, 0.0), loads=loads)
-
-
 def shuffled(name):
     return sinking(described(wall(name), order=np.random.default_rng(3).permutation(wall(name).n_blocks)))
 
@@ -72,9 +62,8 @@ DESCRIPTIONS = {
     "mirrored": (1.0, lambda name: sinking(described(wall(name), lambda o: (o * [-1.0, 1.0])[::-1]))),
     "shuffled": (1.0, shuffled),
     "renumbered": (1.0, lambda name: sinking(described(wall(name), lambda o: np.roll(o, 1, axis=0)))),
-    "turned": (1.0, turned),
     "ten times larger": (10.0, lambda name: sinking(described(wall(name), lambda o: 10.0 * o), size=10.0)),
-    "three times heavier": (1.0, lambda name: sinking(described(wall(name), density=6000.0))),
+    "a thousand times heavier": (1.0, lambda name: sinking(described(wall(name), density=2e6))),
 }
 
 
@@ -152,14 +141,6 @@ def test_a_keystone_between_equal_halves_slips_the_same_way_in_any_increment():
     # Settled by 0.02 m it still stands upright.
     assert abs(turned_by[0]) > 5e-3
     assert turned_by[1] == pytest.approx(turned_by[0], rel=0.2)
-
-
-@pytest.mark.thorough
-def test_a_wall_a_thousand_times_as_heavy_ends_alike():
-    _, expected = as_drawn("panel")
-    response = sinking(described(wall("panel"), density=2e6))
-    assert response.stop is solver.Status.LIMIT_REACHED, response.message
-    assert response.reaction / response.total_weight == pytest.approx(expected, rel=2e-3)
 
 
 @pytest.mark.thorough
