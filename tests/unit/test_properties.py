@@ -135,9 +135,40 @@ def test_frame(name, angle):
     assert_same(name, CASES[name].mapped(rotation(angle)).settle())
 
 
+@pytest.mark.thorough
+@ARCHES_THOROUGHLY
+@few
+@given(exponent=st.floats(-3, 3), heavier=st.floats(-3, 3))
+def test_units(name, exponent, heavier):
+    """Lengths in millimetres or kilometres, forces in kilonewtons or millinewtons."""
+    case, length, density = CASES[name], 10.0**exponent, 10.0**heavier
+    scaled = replace(
+        case,
+        outlines=tuple(length * outline for outline in case.outlines),
+        increment=length * case.increment,
+        limit=length * case.limit,
+        density=density * case.density,
+    )
+    assert_same(name, scaled.settle(), length, density * length**2)
+
+
 @ARCHES_THOROUGHLY
 def test_mirror_image(name):
     assert_same(name, CASES[name].mapped(np.diag([-1.0, 1.0])).settle())
+
+
+@pytest.mark.thorough
+@ARCHES_THOROUGHLY
+@few
+@given(random=st.randoms(use_true_random=False))
+def test_order_of_the_blocks(name, random):
+    case = CASES[name]
+    order = list(range(len(case.roles)))
+    random.shuffle(order)
+    # Each outline starts at another corner too.
+    outlines = tuple(np.roll(case.outlines[i], random.randrange(4), axis=0) for i in order)
+    shuffled = replace(case, outlines=outlines, roles=tuple(case.roles[i] for i in order))
+    assert_same(name, shuffled.settle())
 
 
 @ARCHES_THOROUGHLY
@@ -162,3 +193,16 @@ def test_blocks_that_sink_along_a_head_joint_do_not_move_sideways(scale):
         moved = increment.pose.displacements(response.assembly)
         assert np.abs(moved[[2, 6], 0]).max() < 1e-6 * scale
         assert moved[9, 2] == pytest.approx(-np.arctan(increment.settlement / scale), abs=5e-4)
+
+
+@pytest.mark.thorough
+def test_frame_of_a_stack_bond():
+    """Four corners meet at each crossing of the joints: whether diagonal neighbours touch is up to rounding."""
+    outlines = [[[2 * i, j], [2 * i + 2, j], [2 * i + 2, j + 1], [2 * i, j + 1]] for j in range(3) for i in range(4)]
+    outlines += [[[-1, -1], [4, -1], [4, 0], [-1, 0]], [[4, -1], [9, -1], [9, 0], [4, 0]]]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free"] * 12 + ["fixed", "moving"])
+    case = _case(assembly, 0.6, (0.0, -1.0), 0.01, 0.01)
+    straight = case.settle().initial_reaction
+    assert [case.mapped(rotation(angle)).settle().initial_reaction for angle in (0.3, 1.0, 2.0)] == pytest.approx(
+        [straight] * 3, rel=1e-6
+    )
