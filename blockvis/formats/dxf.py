@@ -16,6 +16,7 @@ import ezdxf
 import numpy as np
 from ezdxf import recover, transform
 from ezdxf.colors import BYBLOCK, BYLAYER, DXF_DEFAULT_COLORS, WHITE, int2rgb
+from ezdxf.entities import DXFTagStorage
 from ezdxf.math import BSpline, bulge_to_arc, fit_points_to_cad_cv
 from ezdxf.path import Path as Drawn
 from ezdxf.path import add_spline, make_path
@@ -96,7 +97,10 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     shut = frozen | {layer.dxf.name for layer in document.layers if layer.is_off()}
     found = _Found(notes=doubts)
     for entity, handle in _bounded(document.modelspace(), path, frozen):
-        if entity.dxf.layer in shut:
+        if isinstance(entity, DXFTagStorage):
+            # Of a kind that ezdxf does not know, such as AEC_WALL: it has no layer to ask for.
+            found.skipped[entity.dxftype()] += 1
+        elif entity.dxf.layer in shut:
             found.hidden[entity.dxf.layer] += 1
         elif entity.dxf.get("invisible", 0):
             found.skipped[f"invisible {entity.dxftype()}"] += 1

@@ -93,9 +93,11 @@ def _read_mesh(path: Path, suffix: str, cards: Sequence[_Card]) -> tuple[Any, di
                 mesh = meshio.read(_Ending(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
             elif cards:
                 mesh = meshio.read(io.StringIO(_mesh_alone(cards)), "abaqus")
-            elif suffix in (".bdf", ".fem", ".nas") and "BEGIN BULK" not in (text := path.read_text(errors="replace")):
-                # gmsh leaves out the line for which meshio waits.
-                mesh = meshio.read(io.StringIO(f"BEGIN BULK\n{text}"), "nastran")
+            elif suffix in (".bdf", ".fem", ".nas"):
+                # gmsh leaves out the first line for which meshio waits; for a card it waits beyond the end of a file.
+                text = path.read_text(errors="replace")
+                first = "" if "BEGIN BULK" in text else "BEGIN BULK\n"
+                mesh = meshio.read(io.StringIO(f"{first}{text}\nbeyond the end"), "nastran")
             else:
                 mesh = meshio.read(path)
             return mesh, _abaqus_sets(cards, mesh.cells) if cards else {}

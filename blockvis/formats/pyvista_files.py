@@ -91,6 +91,12 @@ def _check_legacy(path: Path) -> None:
     data = path.read_bytes()
     if not data.lstrip().startswith(b"# vtk DataFile"):
         raise _not_vtk(data)
+    version = re.match(rb"\s*# vtk DataFile Version (\d{1,2})\.\d+[ \t]*\r?\n", data)
+    offsets = re.search(rb"(?im)^[ \t]*OFFSETS[ \t]", data) is not None
+    # Offsets VTK takes for numbers of corners in a version that has none, and ends the process.
+    if version is None or (offsets and int(version[1]) < 5):
+        named = data.lstrip().splitlines()[0][:40].decode(errors="replace")
+        raise ValueError(f"its first line, '{named}', is not of the version of its cells; export it again")
     found = re.finditer(
         rb"(?im)^[ \t]*(?:POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|CELL_DATA|POINT_DATA|METADATA"
         rb"|FIELD[ \t]+\S+|LOOKUP_TABLE[ \t]+\S+|[XYZ]_COORDINATES|OFFSETS|CONNECTIVITY)[ \t]+(-?\d+)"
@@ -154,7 +160,7 @@ def _counts(element: ElementTree.Element, size: int) -> dict[str, int]:
         if key in ("WholeExtent", "Extent"):
             ends = [int(end[:15]) for end in re.findall(r"-?\d+", value)]
             counts[key] = math.prod(abs(b - a) + 1 for a, b in zip(ends[::2], ends[1::2], strict=False))
-        elif key.startswith("NumberOf"):
+        elif key.startswith("NumberOf") or key == "index":
             if not re.fullmatch(r"\s*\d{1,15}\s*", value):
                 raise ValueError(f"it announces {value[:20]} items in {size} bytes ({key}); export it again")
             counts[key] = int(value)
@@ -249,7 +255,7 @@ def found_in_dataset(data: Any, view: str | None) -> Layout | Bodies:
     for cell in surface:
         nodes = connectivity[offset[cell] : offset[cell + 1]].astype(np.int64)
         rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
-    cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
+    cell_data = _cell_data(grid, surface)
     found = layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, view)
     notes += _unread(types[~gone & ~np.isin(types, list(VTK))])
     return replace(found, notes=(*found.notes, *notes))
@@ -264,6 +270,13 @@ def _unread(types: np.ndarray) -> tuple[str, ...]:
     listed = ", ".join(f"{n} {kind}" for kind, n in counts.items())
     text = f"left out: {counted(counts.total(), 'cell')} of kinds that are not read ({listed})"
     return (Note(LEFT_OUT, f"{text}; save them as polygons or polyhedra"),)
+
+
+def _cell_data(grid: Any, cells: np.ndarray) -> dict[str, np.ndarray]:
+    """Give the arrays of these cells, by their numbers or a mask, by their names."""
+    if not all(isinstance(key, str) for key in grid.cell_data):
+        raise ValueError("it has a cell array whose name cannot be read; give it another name")
+    return {key: np.asarray(grid.cell_data[key])[cells] for key in grid.cell_data}
 
 
 def _gone(grid: Any) -> np.ndarray:
@@ -316,7 +329,7 @@ def _bodies_of_solids(grid: Any, stands: np.ndarray) -> Bodies:
     """Read the bodies of the cells with a volume that stand."""
     types = np.asarray(grid.celltypes)
     solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]) & stands)
-    data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}
+    data = _cell_data(grid, solid)
     key, names, owner = owners(data, len(solid))
     how = f"one block per value of the cell array '{key}'"
     if key is None:

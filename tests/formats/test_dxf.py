@@ -219,6 +219,23 @@ def test_open_polyline_names_layer_handle_and_gap(tmp_path):
         read(saved(tmp_path, draw))
 
 
+def test_kinds_that_ezdxf_does_not_know_are_skipped_with_a_note(tmp_path):
+    """Walls of AutoCAD Architecture are such: they ended in a traceback, as they have no layer for ezdxf."""
+
+    def draw(document, space):
+        space.add_lwpolyline(SQUARE, close=True)
+        space.add_point((0, 0))
+
+    path = saved(tmp_path, draw)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(
+        text.replace("\nPOINT\n", "\nAEC_WALL\n").replace("\nAcDbPoint\n", "\nAecDbWall\n"), encoding="utf-8"
+    )
+    drawing = read_layout(path)
+    assert drawing.n_blocks == 1
+    assert "skipped: 1 AEC_WALL" in drawing.notes
+
+
 def test_hidden_layers_and_texts_are_skipped_with_a_note(tmp_path):
     def draw(document, space):
         document.layers.add("old").off()

@@ -231,6 +231,13 @@ def test_nastran_without_its_first_line(tmp_path):
     assert read(tmp_path / "b.bdf").areas == pytest.approx([1, 1], rel=1e-6)
 
 
+def test_nastran_without_a_card_is_refused(tmp_path):
+    """For the first card meshio waited for ever."""
+    (tmp_path / "a.bdf").write_text("$ Nastran file\nBEGIN BULK\n$ no more\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="cannot be read by meshio as .bdf"):
+        read(tmp_path / "a.bdf")
+
+
 def test_small_and_capital_letters_of_set_names_are_the_same(tmp_path):
     path = tmp_path / "a.inp"
     stones = STONES.replace("ELSET=fixed", "ELSET=Stone1")

@@ -114,6 +114,39 @@ def test_a_hostile_count_is_refused_before_memory_is_reserved(tmp_path):
         read(tmp_path / "b.vtk")
 
 
+@pytest.mark.parametrize("index", [-7, 2147483648])
+def test_a_part_of_an_absurd_number_is_refused(tmp_path, index):
+    """VTK reserves memory for as many parts, and ended the process."""
+    quads().cast_to_unstructured_grid().save(tmp_path / "part.vtu")
+    dataset = f'<vtkMultiBlockDataSet><DataSet index="{index}" file="part.vtu"/></vtkMultiBlockDataSet>'
+    (tmp_path / "a.vtm").write_text(
+        f'<VTKFile type="vtkMultiBlockDataSet" version="1.0">{dataset}</VTKFile>', encoding="utf-8"
+    )
+    with pytest.raises(ValueError, match=rf"announces {index} items in \d+ bytes"):
+        read(tmp_path / "a.vtm")
+
+
+@pytest.mark.parametrize("version", [b"0.1", b"-7.1", b"1e308.1", b"5.vtk", b""])
+def test_a_version_that_is_not_that_of_the_cells_is_refused(tmp_path, version):
+    """VTK read their offsets as numbers of corners, and ended the process."""
+    quads().cast_to_unstructured_grid().save(tmp_path / "a.vtk")
+    data = (tmp_path / "a.vtk").read_bytes()
+    assert data.startswith(b"# vtk DataFile Version 5.1\n")
+    (tmp_path / "b.vtk").write_bytes(data.replace(b"5.1", version, 1))
+    with pytest.raises(ValueError, match="is not of the version of its cells; export it again"):
+        read(tmp_path / "b.vtk")
+
+
+def test_a_cell_array_whose_name_is_no_text_is_refused(tmp_path):
+    grid = quads().cast_to_unstructured_grid()
+    grid.cell_data["thickness"] = np.ones(grid.n_cells)
+    grid.save(tmp_path / "a.vtk")
+    data = (tmp_path / "a.vtk").read_bytes()
+    (tmp_path / "b.vtk").write_bytes(data.replace(b"thickness", b"thickne\xf3s", 1))
+    with pytest.raises(ValueError, match="cell array whose name cannot be read; give it another name"):
+        read(tmp_path / "b.vtk")
+
+
 def test_an_array_that_vtk_gives_up_is_not_left_out_in_silence(tmp_path):
     """meshio names types of VTK's own, at which VTK leaves out all further arrays."""
     mesh = pv.Plane(i_resolution=2, j_resolution=1).triangulate().cast_to_unstructured_grid()
