@@ -90,14 +90,17 @@ def _read_mesh(path: Path, suffix: str, cards: Sequence[_Card]) -> tuple[Any, di
         # meshio prints to the terminal, and raises SystemExit for some files.
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             if suffix in (".tec", ".dat"):
-                mesh = meshio.read(_Ending(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
+                mesh = meshio.read(_EndingText(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
             elif cards:
                 mesh = meshio.read(io.StringIO(_mesh_alone(cards)), "abaqus")
+            elif suffix == ".mdpa":
+                with _EndingFile(io.FileIO(path)) as file:
+                    mesh = meshio.read(file, "mdpa")
             elif suffix in (".bdf", ".fem", ".nas"):
-                # gmsh leaves out the first line for which meshio waits; for a card it waits beyond the end of a file.
+                # gmsh leaves out the first line, for which meshio waits.
                 text = path.read_text(errors="replace")
                 first = "" if "BEGIN BULK" in text else "BEGIN BULK\n"
-                mesh = meshio.read(io.StringIO(f"{first}{text}\nbeyond the end"), "nastran")
+                mesh = meshio.read(_EndingText(f"{first}{text}"), "nastran")
             else:
                 mesh = meshio.read(path)
             return mesh, _abaqus_sets(cards, mesh.cells) if cards else {}
@@ -161,18 +164,26 @@ def _bodies(points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dic
     return Bodies(bodies, notes=(how,))
 
 
-class _Ending(io.StringIO):
-    """A text that raises an error if it is read far beyond its end, as meshio's reader of Tecplot files does."""
+class _Ending:
+    """Raises an error where a file is read far beyond its end, as meshio's readers do that wait for a line."""
 
     ends = 0
 
-    def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
+    def readline(self, size: int | None = -1, /) -> Any:
         """Read the next line."""
-        line = super().readline(-1 if size is None else size)
+        line = super().readline(-1 if size is None else size)  # type: ignore[misc]
         self.ends = 0 if line else self.ends + 1
         if self.ends > 100:
             raise EOFError("the file ends too early")
         return line
+
+
+class _EndingText(_Ending, io.StringIO):
+    """A text that raises an error beyond its end."""
+
+
+class _EndingFile(_Ending, io.BufferedReader):
+    """A file that raises an error beyond its end."""
 
 
 def _check_text(path: Path) -> None:

@@ -112,6 +112,56 @@ def _check_legacy(path: Path) -> None:
         sizes = [int(number[:18]) for number in match[1].split()]
         counts += [min(sizes), math.prod(sizes)]
     _refuse(counts, len(data))
+    _check_cells(data)
+
+
+def _check_cells(data: bytes) -> None:
+    """Refuse cells of a .vtk that do not add up to the numbers it announces: VTK reads beyond their end."""
+    binary = re.search(rb"(?im)^[ \t]*BINARY[ \t]*\r?$", data) is not None
+    # An array of a field has its type behind two numbers, too.
+    kinds = rb"(?im)^[ \t]*(?:CELLS|POLYGONS|LINES|VERTICES|TRIANGLE_STRIPS)\s+(\d+)\s+(\d+)(?=\s)(?![ \t]+[a-z])"
+    for match in re.finditer(kinds, data):
+        cells, size = int(match[1]), int(match[2])
+        offsets = re.compile(rb"\s*OFFSETS\s+(\w+)", re.IGNORECASE).match(data, match.end())
+        read = _binary_numbers if binary else _written_numbers
+        if offsets:
+            long = offsets[1].lower() in (b"vtktypeint64", b"vtktypeuint64", b"long")
+            fits = _rise_to(read(data, offsets.end(), cells, ">i8" if long else ">i4"), cells, size)
+        else:
+            fits = _run_through(read(data, match.end(), size, ">i4").tolist(), cells, size)
+        if not fits:
+            raise ValueError(
+                f"its {cells} cells do not add up to the {size} numbers that it announces; export it again"
+            )
+
+
+def _binary_numbers(data: bytes, after: int, count: int, kind: str) -> np.ndarray:
+    """Read up to so many numbers from the line below a place."""
+    start, size = data.find(b"\n", after) + 1, np.dtype(kind).itemsize
+    return np.frombuffer(data, kind, min(count, (len(data) - start) // size), start)
+
+
+def _written_numbers(data: bytes, after: int, count: int, kind: str) -> np.ndarray:
+    """Read up to so many numbers that are written out behind a place; -1 for other words."""
+    words = data[after:].split(None, count)[:count]
+    return np.array([int(word) if re.fullmatch(rb"\d{1,9}", word) else -1 for word in words], dtype=kind)
+
+
+def _rise_to(offsets: np.ndarray, cells: int, size: int) -> bool:
+    """Whether the offsets of cells, one more than there are, rise from 0 to the size."""
+    if cells == 0 or len(offsets) != cells:
+        return cells == 0
+    return bool(offsets[0] == 0 and offsets[-1] == size and (np.diff(offsets) >= 0).all())
+
+
+def _run_through(numbers: list[int], cells: int, size: int) -> bool:
+    """Whether so many cells, the number of corners before those of each, fill the numbers of this size."""
+    place = 0
+    for _ in range(cells):
+        if not place < len(numbers) or numbers[place] < 0:
+            return False
+        place += 1 + numbers[place]
+    return place == size == len(numbers)
 
 
 def _check_xml(path: Path) -> None:

@@ -231,10 +231,23 @@ def test_nastran_without_its_first_line(tmp_path):
     assert read(tmp_path / "b.bdf").areas == pytest.approx([1, 1], rel=1e-6)
 
 
+@pytest.mark.parametrize("ends", [b"\nEnd Nodes", b"\nEnd Elements"])
+def test_kratos_file_without_its_ends_is_refused(tmp_path, ends):
+    """For the end of a table meshio waited for ever."""
+    quads = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+    meshio.write(tmp_path / "a.mdpa", meshio.Mesh(POINTS[:6], [("quad", quads)]))
+    assert read(tmp_path / "a.mdpa").areas == pytest.approx([1, 1], rel=1e-6)
+    data = (tmp_path / "a.mdpa").read_bytes()
+    assert ends in data
+    (tmp_path / "b.mdpa").write_bytes(data[: data.index(ends)])
+    with pytest.raises(ValueError, match=r"cannot be read by meshio as \.mdpa"):
+        read(tmp_path / "b.mdpa")
+
+
 def test_nastran_without_a_card_is_refused(tmp_path):
     """For the first card meshio waited for ever."""
     (tmp_path / "a.bdf").write_text("$ Nastran file\nBEGIN BULK\n$ no more\n", encoding="utf-8")
-    with pytest.raises(ValueError, match="cannot be read by meshio as .bdf"):
+    with pytest.raises(ValueError, match=r"cannot be read by meshio as \.bdf"):
         read(tmp_path / "a.bdf")
 
 

@@ -126,6 +126,33 @@ def test_a_part_of_an_absurd_number_is_refused(tmp_path, index):
         read(tmp_path / "a.vtm")
 
 
+@pytest.mark.parametrize("binary", [True, False])
+def test_offsets_beyond_the_numbers_of_cells_are_refused(tmp_path, binary):
+    """VTK read on beyond them, and ended the process."""
+    quads().cast_to_unstructured_grid().save(tmp_path / "a.vtk", binary=binary)
+    data = (tmp_path / "a.vtk").read_bytes()
+    assert read(tmp_path / "a.vtk").n_blocks
+    old, new = (b"\0\0\0\x04", b"\0\0@\x04") if binary else (b"\n0 4 ", b"\n0 4000 ")
+    start = data.index(b"OFFSETS")
+    (tmp_path / "b.vtk").write_bytes(data[:start] + data[start:].replace(old, new, 1))
+    with pytest.raises(ValueError, match=r"cells do not add up to the \d+ numbers that it announces"):
+        read(tmp_path / "b.vtk")
+
+
+@pytest.mark.parametrize("announced", ["2 2 10", "2 10 10", "2 9", "3 10"])
+def test_cells_of_old_files_that_do_not_add_up_are_refused(tmp_path, announced):
+    cells = "CELLS 2 10\n4 0 1 2 3\n4 1 4 5 2\nCELL_TYPES 2\n9\n9\n"
+    points = "POINTS 6 double\n0 0 0 1 0 0 1 1 0 0 1 0 2 0 0 2 1 0\n"
+    # A field whose name is that of cells is none.
+    field = "CELL_DATA 2\nFIELD f 1\nlines 1 2 int\n5 6\n"
+    text = f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\n{points}{cells}{field}"
+    (tmp_path / "a.vtk").write_text(text, encoding="utf-8")
+    assert read(tmp_path / "a.vtk").n_blocks == 2
+    (tmp_path / "b.vtk").write_text(text.replace("2 10", announced, 1), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"cells do not add up to|cannot be read whole"):
+        read(tmp_path / "b.vtk")
+
+
 @pytest.mark.parametrize("version", [b"0.1", b"-7.1", b"1e308.1", b"5.vtk", b""])
 def test_a_version_that_is_not_that_of_the_cells_is_refused(tmp_path, version):
     """VTK read their offsets as numbers of corners, and ended the process."""
