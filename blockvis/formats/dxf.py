@@ -97,15 +97,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     shut = frozen | {layer.dxf.name for layer in document.layers if layer.is_off()}
     found = _Found(notes=doubts)
     for entity, handle in _bounded(document.modelspace(), path, frozen):
-        if isinstance(entity, DXFTagStorage):
-            # Of a kind that ezdxf does not know, such as AEC_WALL: it has no layer to ask for.
-            found.skipped[entity.dxftype()] += 1
-        elif entity.dxf.layer in shut:
-            found.hidden[entity.dxf.layer] += 1
-        elif entity.dxf.get("invisible", 0):
-            found.skipped[f"invisible {entity.dxftype()}"] += 1
-        else:
-            _add(entity, handle, found, tolerance)
+        _add_shown(entity, handle, found, tolerance, shut)
     closed = meshes_of_faces([(one.row["group"], one.row["name"], one.points) for one in found.faces])
     if closed:
         found.meshes += closed
@@ -276,6 +268,18 @@ def _flattened(curve: Any, tolerance: float | None) -> Stroke:
     distance = max(1e-3 * size if tolerance is None else tolerance, 1e-6 * size)
     points = np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)])
     return Stroke(points=points, off_others=distance)
+
+
+def _add_shown(entity: Any, handle: str, found: _Found, tolerance: float | None, shut: Set[str]) -> None:
+    if isinstance(entity, DXFTagStorage):
+        # Of a kind that ezdxf does not know, such as AEC_WALL: it has no layer to ask for.
+        found.skipped[entity.dxftype()] += 1
+    elif entity.dxf.layer in shut:
+        found.hidden[entity.dxf.layer] += 1
+    elif entity.dxf.get("invisible", 0):
+        found.skipped[f"invisible {entity.dxftype()}"] += 1
+    else:
+        _add(entity, handle, found, tolerance)
 
 
 def _add(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:

@@ -174,8 +174,10 @@ def mutated(data: bytes, random: np.random.Generator) -> bytes:
 
     Of half the texts whole lines or words change places, which readers get further with than with damaged bytes.
     """
-    if random.random() < 0.5 and data.isascii():
-        return _reordered(data, random)
+    return _reordered(data, random) if random.random() < 0.5 and data.isascii() else _damaged(data, random)
+
+
+def _damaged(data: bytes, random: np.random.Generator) -> bytes:
     out = bytearray(data)
     for _ in range(int(random.integers(1, 6))):
         if not out:
@@ -246,6 +248,21 @@ def read_all(paths: list[Path], folder: Path) -> list[dict[str, object]]:
     return outcomes
 
 
+def _told(fixture: str, outcomes: list[dict[str, object]], keep: str | None) -> int:
+    """Print what became of the files of a fixture, keep those that failed, and count them."""
+    counts = Counter(str(outcome["outcome"]) for outcome in outcomes)
+    slowest = max(float(str(outcome.get("seconds", 0.0))) for outcome in outcomes)
+    print(f"{fixture:16} {dict(counts)}, slowest {slowest:.2f} s", flush=True)
+    bad = [outcome for outcome in outcomes if outcome["outcome"] not in ("read", "refused")]
+    for outcome in bad:
+        path = Path(str(outcome["file"]))
+        print(f"   {path.name} {outcome['outcome']}: {str(outcome['message'])[-700:]}", flush=True)
+        if keep:
+            Path(keep).mkdir(exist_ok=True)
+            (Path(keep) / path.name).write_bytes(path.read_bytes())
+    return len(bad)
+
+
 def main() -> int:
     """Runs the campaign."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -268,18 +285,7 @@ def main() -> int:
         # All of them in as few processes as may be: each takes seconds to load its libraries.
         of_file = {Path(str(outcome["file"])): outcome for outcome in read_all(every, folder)}
         for fixture, own in paths.items():
-            outcomes = [of_file[path] for path in own]
-            counts = Counter(str(outcome["outcome"]) for outcome in outcomes)
-            slowest = max(float(str(outcome.get("seconds", 0.0))) for outcome in outcomes)
-            print(f"{fixture:16} {dict(counts)}, slowest {slowest:.2f} s", flush=True)
-            for path, outcome in zip(own, outcomes, strict=True):
-                if outcome["outcome"] in ("read", "refused"):
-                    continue
-                failed += 1
-                print(f"   {path.name} {outcome['outcome']}: {str(outcome['message'])[-700:]}", flush=True)
-                if options.keep:
-                    Path(options.keep).mkdir(exist_ok=True)
-                    (Path(options.keep) / path.name).write_bytes(path.read_bytes())
+            failed += _told(fixture, [of_file[path] for path in own], options.keep)
     print(f"{len(every)} files, {failed} failed")
     return int(failed > 0)
 
