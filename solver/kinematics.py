@@ -163,29 +163,6 @@ def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -
     return after.positions[blocks] + turned(points - before.positions[blocks], turn)
 
 
-def swung(pose: Pose, motion: np.ndarray) -> Pose:
-    """Move each block on the arc about its own pole, so that macro-blocks stay together.
-
-    By the translation of its centroid [m] and rotation [rad], (n_blocks, n_dof), as a linear program has them; in space
-    a screw motion.
-
-    Notes
-    -----
-    In space the centroid, at velocity v and spin ω, travels on a helix: with θ = |ω|, by
-    v sin θ / θ + ω × v (1 - cos θ) / θ² + ω (ω · v) (θ - sin θ) / θ³; in the plane, where ω · v = 0, on an arc about
-    the pole.
-    """
-    d = pose.positions.shape[1]
-    travel, spin = motion[:, :d], motion[:, d:]
-    angle = np.linalg.norm(spin, axis=1)
-    first, second = np.sinc(angle / np.pi), np.sinc(angle / (2.0 * np.pi)) ** 2 / 2.0
-    paths = first[:, None] * travel + second[:, None] * np.einsum("nrd,nr->nd", cross_rows(travel), spin)
-    if d == 3:
-        third = np.divide(1.0 - first, angle**2, out=np.full_like(angle, 1.0 / 6.0), where=angle > 1e-4)
-        paths += (third * np.einsum("ni,ni->n", spin, travel))[:, None] * spin
-    return Pose(pose.positions + paths, composed_rotations(pose.rotations, spin))
-
-
 def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity: np.ndarray) -> np.ndarray:
     """(n, d) array: velocity of points [m] that move with blocks, (n,) int: that of the centroid, and spin × arm.
 

@@ -16,12 +16,12 @@ from .geometry.portions import linked
 from .interfaces import steep_note
 from .kinematics import (
     carried,
+    cross_rows,
     motion_size,
     moved,
     moved_vertices,
     point_velocities,
     rotation_matrices,
-    swung,
     turned,
     turned_moments,
 )
@@ -71,10 +71,10 @@ __all__ = [
     "TIE_KINDS", "YIELDING", "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Ending",
     "Increments", "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes",
     "State", "Stepper", "StoredState", "TieForces", "block_forces", "carried", "check_settlement", "corners_and_edges",
-    "counted", "falling_blocks", "find_contacts", "is_member", "joined_contacts", "linked", "lowest",
+    "counted", "cross_rows", "falling_blocks", "find_contacts", "is_member", "joined_contacts", "linked", "lowest",
     "matched_contacts", "mechanism_of", "member_contacts", "member_forces", "member_states", "minimise", "model_of",
     "motion_size", "moved", "moved_vertices", "overlap_depths", "path_parameters", "point_velocities",
     "present_members", "pushover_increments", "reaction_to", "rigid_parts", "rotation_matrices", "settlement_in",
-    "settlement_increments", "steep_note", "swung", "tie_ends", "tie_lengths", "total_weight", "turned",
+    "settlement_increments", "steep_note", "tie_ends", "tie_lengths", "total_weight", "turned",
     "turned_moments", "unique_names", "with_motion", "worst_of", "wrench_matrix"
 ]  # fmt: skip

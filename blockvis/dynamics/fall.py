@@ -75,7 +75,7 @@ class Fall:
         turn = before.movement_to(after)
         turn[:, : before.positions.shape[1]] = 0.0
         places = before.positions + t * (after.positions - before.positions)
-        return solver.Pose(places, mechanics.swung(before, t * turn).rotations)
+        return solver.Pose(places, mechanics.moved(before, t * turn).rotations)
 
     def ties_at(self, time: float, response: solver.Response) -> mechanics.TieForces:
         """Return what ties, props and bars of its response do at a time [s], as at the pose that is kept before it."""

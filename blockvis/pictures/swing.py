@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import falls_from
-from blockvis.results.mechanism_arrays import SWING, corner_speeds, swung_increment
+from blockvis.results.mechanism_arrays import SWING, corner_speeds, swung, swung_increment
 from solver import mechanics
 
 from . import palette
@@ -65,7 +65,7 @@ def swing_of(response: solver.Response) -> Swing:
     size = float(framed(assembly, [last.pose]).size.max())
     motion = motion * (SWING * size / fastest if fastest > 0 else 0.0)
     share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(assembly, last, motion), 1e-300))))
-    displaced = mechanics.swung(last.pose, share * motion)
+    displaced = swung(last.pose, share * motion)
     return Swing(last, begins, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, share * motion, share)
 
 
@@ -106,7 +106,7 @@ def _torn(assembly: solver.Assembly, increment: solver.Increment, motion: np.nda
     """
     # Not those of its forces: where nothing ever stood there are none.
     hinges = increment.contacts[mechanics.mechanism_of(assembly, increment).hinge_points]
-    before, after, points = increment.pose, mechanics.swung(increment.pose, motion), hinges.points
+    before, after, points = increment.pose, swung(increment.pose, motion), hinges.points
     of_a, of_b = (
         mechanics.carried(points, block, before, after) - mechanics.point_velocities(points, block, before, motion)
         for block in (hinges.block_a, hinges.block_b)

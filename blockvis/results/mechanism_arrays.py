@@ -66,9 +66,32 @@ def swing_factors(
     return np.asarray(shares * (reach * float(np.ptp(corners, axis=0).max())) / fastest)
 
 
+def swung(pose: solver.Pose, motion: np.ndarray) -> solver.Pose:
+    """Move each block on the arc about its own pole, so that macro-blocks stay together.
+
+    By the translation of its centroid [m] and rotation [rad], (n_blocks, n_dof), as a linear program has them; in space
+    a screw motion.
+
+    Notes
+    -----
+    In space the centroid, at velocity v and spin ω, travels on a helix: with θ = |ω|, by
+    v sin θ / θ + ω × v (1 - cos θ) / θ² + ω (ω · v) (θ - sin θ) / θ³; in the plane, where ω · v = 0, on an arc about
+    the pole.
+    """
+    d = pose.positions.shape[1]
+    travel, spin = motion[:, :d], motion[:, d:]
+    angle = np.linalg.norm(spin, axis=1)
+    first, second = np.sinc(angle / np.pi), np.sinc(angle / (2.0 * np.pi)) ** 2 / 2.0
+    paths = first[:, None] * travel + second[:, None] * np.einsum("nrd,nr->nd", mechanics.cross_rows(travel), spin)
+    if d == 3:
+        third = np.divide(1.0 - first, angle**2, out=np.full_like(angle, 1.0 / 6.0), where=angle > 1e-4)
+        paths += (third * np.einsum("ni,ni->n", spin, travel))[:, None] * spin
+    return solver.Pose(pose.positions + paths, mechanics.moved(pose, motion).rotations)
+
+
 def swung_increment(increment: solver.Increment, motion: np.ndarray) -> solver.Increment:
     """Give the blocks of a state after a motion (n_blocks, n_dof), with its contact points carried along."""
-    contacts, pose = increment.contacts, mechanics.swung(increment.pose, motion)
+    contacts, pose = increment.contacts, swung(increment.pose, motion)
     points = carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     moved = increment.with_arrays(pose=pose, contacts=replace(contacts, points=points))
     return replace(moved, status=solver.Status.FALLING, programs=0, seconds=0.0, checkpoint=None)

@@ -24,7 +24,7 @@ from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import collapse_phase, governing_limit, loss_in, phases_of
 from blockvis.results.joints import initial_joints, opening_and_slip
-from blockvis.results.mechanism_arrays import SWING, swing_factors
+from blockvis.results.mechanism_arrays import SWING, swing_factors, swung
 from blockvis.results.tables import finite
 from blockvis.runs.plan import planned
 from solver import mechanics
@@ -223,7 +223,7 @@ def _shape(
     at_rest = mechanics.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
     (factor,) = swing_factors(assembly, falling, SWING, np.ones(1))
-    moved = mechanics.swung(falling.pose, falling.velocity * factor)
+    moved = swung(falling.pose, falling.velocity * factor)
     vertices, tied = mechanics.moved_vertices(assembly, moved), mechanics.tie_ends(response.ties, assembly, moved)
     bodies = fill_bodies(response, moved, falling.fallen)
     rims = bodies.rims()

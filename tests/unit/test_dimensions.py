@@ -7,13 +7,13 @@ import pytest
 from structures import box
 
 import solver
+from blockvis.results.mechanism_arrays import swung
 from solver import mechanics
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import matched_contacts
 from solver.geometry.spatial_features import ACROSS, ON_CORNER, ON_FACE
 from solver.kinematics import (
     composed_rotations,
-    cross_rows,
     dimension_of,
     moved,
     relative_velocities,
@@ -56,7 +56,7 @@ def test_velocities_are_the_limit_of_small_movements(d):
     pose, block = poses(d), np.arange(20)
     points, motion = RANDOM.normal(size=(20, d)), RANDOM.normal(size=(20, d + rotation_count(d)))
     velocity = mechanics.point_velocities(points, block, pose, motion)
-    for move in (moved, mechanics.swung):
+    for move in (moved, swung):
         small = mechanics.carried(points, block, pose, move(pose, 1e-7 * motion))
         np.testing.assert_allclose((small - points) / 1e-7, velocity, atol=1e-5)
 
@@ -65,11 +65,11 @@ def test_velocities_are_the_limit_of_small_movements(d):
 def test_swung_blocks_of_one_rigid_motion_stay_together(d):
     pose = poses(d, 2)
     spin = RANDOM.normal(size=rotation_count(d))
-    rows = cross_rows(pose.positions)
+    rows = mechanics.cross_rows(pose.positions)
     travel = RANDOM.normal(size=d) + np.einsum("nri,r->ni", rows, spin)
     motion = np.concatenate([travel, np.tile(spin, (2, 1))], axis=1)
     points = RANDOM.normal(size=(5, d))
-    after = mechanics.swung(pose, motion)
+    after = swung(pose, motion)
     on_each = [mechanics.carried(points, np.full(5, k), pose, after) for k in (0, 1)]
     np.testing.assert_allclose(on_each[0], on_each[1], atol=1e-12)
 

@@ -249,7 +249,7 @@ def test_parts_swing_as_one_body():
     response = arch_response()
     falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
     parts = mechanics.rigid_parts(response.assembly, falling)
-    displaced = mechanics.swung(falling.pose, 0.1 * response.collapse.mechanism)
+    displaced = swung_increment(falling, 0.1 * response.collapse.mechanism).pose
     outlines = marks.part_outlines(response.assembly, mechanics.moved_vertices(response.assembly, displaced), parts)
     length = np.hypot(*(outlines[:, 1] - outlines[:, 0]).T).sum()
     before = marks.part_outlines(response.assembly, mechanics.moved_vertices(response.assembly, falling.pose), parts)
