@@ -21,6 +21,7 @@ from blockvis.results.about import (
     collapse_phase,
     governing_limit,
     in_phase,
+    limit_states,
     phases_of,
     unit_and_phase,
 )
@@ -185,7 +186,7 @@ class LimitLoadKind(AnalysisKind):
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
         """List the limit loads; of the one that governs its bounds, flow and status, too."""
-        chosen, states = response.governing, response.limit_states
+        chosen, states = response.governing, limit_states(response)
         limit = next((limit for limit, state in states if state is chosen), states[0][0] if states else None)
         governing = {} if limit is None else _stored(limit)
         summary: dict[str, Any] = {
@@ -236,7 +237,7 @@ class LimitLoadKind(AnalysisKind):
         last = ["staying_open"] if known and not over_settlement else []
         header = [*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism", *last]
         rows = []
-        for limit, state in response.limit_states:
+        for limit, state in limit_states(response):
             place = [repr(float(state.parameter))]
             numbers = [repr(float(v)) for v in (limit.multiplier, *limit.bounds)]
             words = str(mechanics.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
@@ -349,7 +350,7 @@ def _before(response: solver.Response) -> float | None:
 
 def _notes_on_places(response: solver.Response) -> list[str]:
     """Say at which of several positions of a load no limit load is known, and where joints that stay open lower it."""
-    states = response.limit_states
+    states = limit_states(response)
     if response.parameter.is_path or len(states) < 2:
         return []
     places = [state.parameter for limit, state in states if limit.status is solver.LimitStatus.NOT_CONVERGED]

@@ -23,6 +23,7 @@ from blockvis.results.about import (
     collapse_phase,
     counts_text,
     in_phase,
+    limit_states,
     losing,
     phases_of,
     response_of,
@@ -309,7 +310,7 @@ class _Plot:
 
     def _unproved(self) -> None:
         """Mark positions of a load whose value is no limit load."""
-        states = [s for limit, s in self.response.limit_states if limit.status is solver.LimitStatus.NOT_CONVERGED]
+        states = [s for limit, s in limit_states(self.response) if limit.status is solver.LimitStatus.NOT_CONVERGED]
         for number, state in enumerate(state for state in states if np.isfinite(state.measured)):
             place = (state.parameter, state.measured / self.factor)
             self.axes.plot(*place, "o", mfc="white", mec=GREY, mew=1.6, markersize=8 if self.words else 5, zorder=5)

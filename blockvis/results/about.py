@@ -50,9 +50,17 @@ def response_of(result: Result) -> solver.Response:
     return result
 
 
+def limit_states(response: solver.Response) -> list[tuple[solver.LimitLoad, solver.Increment]]:
+    """Pair each limit load with the increment that reports it; one found in an interruption has none yet.
+
+    Limit states come first, in the order of the limit loads; frames of a fall or a mechanism follow.
+    """
+    return list(zip(response.limits, response.increments, strict=False))
+
+
 def governing_limit(response: solver.Response) -> solver.LimitLoad | None:
     """Find the limit load of the increment that decides; none where that is no limit state."""
-    return next((limit for limit, state in response.limit_states if state is response.governing), None)
+    return next((limit for limit, state in limit_states(response) if state is response.governing), None)
 
 
 def about(response: solver.Response) -> About:

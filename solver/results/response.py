@@ -201,14 +201,6 @@ class Response(Shown):
         return path[-1 if self.parameter.is_path else lowest([i.measured for i in path])]
 
     @property
-    def limit_states(self) -> list[tuple[LimitLoad, Increment]]:
-        """Each limit load with the increment that reports it; one found in an interruption has none yet.
-
-        Limit states come first, in the order of the limit loads; frames of a fall or a mechanism follow.
-        """
-        return list(zip(self.limits, self.increments, strict=False))
-
-    @property
     def swings(self) -> bool:
         """Whether its frames without equilibrium show a mechanism that begins at a limit state, not a fall."""
         return bool(self.limits) and self.collapse is None and bool(self.path)
