@@ -1,8 +1,7 @@
 """What a package of files and pictures needs of the mechanics beside what users do: shapes, contacts, poses, words."""
 
 from .analysis.increments import Increments
-from .analysis.pushover import pushover_increments
-from .analysis.settlement import check_settlement, model_of, settlement_increments
+from .analysis.path_increments import check_settlement, model_of, pushover_increments, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Shapes, find_contacts, unique_names
 from .contact_step.minimise import minimise
 from .contact_step.problem import ContactProblem

@@ -13,8 +13,7 @@ from solver.words import checked, counted, numbers_of
 
 from .analysis.increments import Increments
 from .analysis.limit_load import find_limit_load
-from .analysis.pushover import pushover_increments
-from .analysis.settlement import settlement_increments
+from .analysis.path_increments import pushover_increments, settlement_increments
 from .assembly import Assembly
 from .interfaces import InterfaceLaw, Interfaces, steep_note
 from .kinematics import Pose
