@@ -279,7 +279,10 @@ class LimitLoadKind(AnalysisKind):
         if "limit_load_caveat" in said:
             lines.append(f"note: {said['limit_load_caveat']}")
         if not response.parameter.is_path and len(path) > 1:
-            lines.append(f"the lowest of {len(path)} positions: load at x = {state.parameter:.6g} m")
+            ends = {path[0].parameter: "the first", path[-1].parameter: "the last"}
+            end = ends.get(state.parameter)
+            beyond = f", {end} of them: it may be lower beyond" if end else ""
+            lines.append(f"the lowest of {len(path)} positions: load at x = {state.parameter:.6g} m{beyond}")
         elif phases_of(response):
             before = _before(response)
             drawn = "" if before is None else f"   before it {before:.6g}"

@@ -157,12 +157,14 @@ def value_label(response: solver.Response) -> str:
 def shown_range(values: np.ndarray, response: solver.Response) -> tuple[float, float]:
     """Range of the axis of the measured value: 0, and the values but those far above the lowest of an envelope.
 
-    The values (n,) of the path are in the unit of the axis, nan or infinite where there are none.
+    At least half of them are shown. The values (n,) of the path are in the unit of the axis, nan or infinite where
+    there are none.
     """
     known = values[np.isfinite(values)]
     low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
     if not response.parameter.is_path and len(known):
-        high = min(high, MOST_OVER_LOWEST * max(float(known.min()), 0.0) or high)
+        most = MOST_OVER_LOWEST * max(float(known.min()), 0.0)
+        high = min(high, max(most, float(np.median(known)))) if most else high
     return low, high
 
 

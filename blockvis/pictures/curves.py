@@ -324,10 +324,14 @@ class _Plot:
         place = (lowest.parameter, lowest.measured)
         self.axes.plot(*place, "o", color=RED, markersize=8 if self.words else 5, zorder=4)
         if self.words:
-            where = f"{response.parameter.symbol} = {place[0]:.4g} {response.parameter.unit}"
-            told = f"lowest {response.measured.symbol} = {place[1]:.5g} at {where}"
+            symbol, unit = response.parameter.symbol, response.parameter.unit
+            told = f"lowest {response.measured.symbol} = {place[1]:.5g} at {symbol} = {place[0]:.4g} {unit}"
             # Of an envelope every place below may be on the curve.
             self.axes.set_title(told, loc="right", fontsize=self.text, color=RED)
+            if self.known.max() > self.axes.get_ylim()[1]:
+                x = self.total[self.values == self.known.max()][0]
+                above = f"above this picture: up to {self.known.max():.4g} at {symbol} = {x:.4g} {unit}"
+                self.axes.set_xlabel(f"{self.axes.get_xlabel()}   ·   {above}", fontsize=self.text)
 
     def _collapse(self, collapse: solver.Collapse) -> None:
         axes, total = self.axes, self.total

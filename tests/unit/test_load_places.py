@@ -72,6 +72,26 @@ def test_axles_move_together_and_are_told_by_the_first(tmp_path):
     assert blockvis.open_results(tmp_path / "out").loads.live.sum(axis=0)[1] == pytest.approx(-1500.0)
 
 
+@pytest.mark.parametrize(("sense", "end"), [(1, "the last"), (-1, "the first")])
+def test_a_lowest_load_at_an_end_and_what_its_picture_leaves_out_are_told(tmp_path, capsys, sense, end):
+    """A block that overhangs its ground by 1 m carries the less the farther out the load is."""
+    near, far = sorted([-1.5 * sense, 0.0]), sorted([-1.5 * sense, 1.0 * sense])
+    outlines = [rectangle(near[0], -0.5, near[1], 0.0), rectangle(far[0], 0.0, far[1], 0.5)]
+    first, last = sorted([0.02 * sense, 0.62 * sense])
+    drawn(tmp_path / "a.json", outlines, ["ground", "block"], role=["fixed", None])
+    case = tmp_path / "a.toml"
+    case.write_text(
+        '[geometry]\nfile = "a.json"\n[analysis]\nkind = "limit load"\n[output]\nanimation = false\n'
+        f'[[loads]]\nkind = "live"\nforce = [0, -1000]\npositions = [{first}, {last}, 4]\n',
+        encoding="utf-8",
+    )
+    assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 0
+    assert f"load at x = {0.62 * sense:g} m, {end} of them: it may be lower beyond" in capsys.readouterr().out
+    most = 0.25 * 2000 * 1.25 * solver.GRAVITY / (1000 * 0.02)
+    svg = blockvis.draw_curve(blockvis.open_results(tmp_path / "out"), tmp_path / "curve.svg").read_text("utf-8")
+    assert f"above this picture: up to {most:.4g} at x = {0.02 * sense:g} m" in svg
+
+
 def test_between_two_blocks_the_force_goes_into_the_one_it_pushes():
     course = float(np.ptp(blockvis.generators.wall(bricks=4, courses=4).outline(2)[:, 1]))
     blocks = {}
