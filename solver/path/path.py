@@ -29,6 +29,9 @@ from .stepping import CARRIES, StepError, Stepper
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.05, 1e-11
 
+#: Lengths of steps that one may have between a length and its double.
+LENGTHS = 4
+
 #: Part of the movement over which friction follows, below which its error shortens no step: what slips or parts at once
 #: does so however short the steps are.
 AT_ONCE = 0.03
@@ -452,11 +455,14 @@ class Path:
         return ahead if ahead <= 1.000001 * step else min(step, ahead / 2.0)
 
     def _next_step(self, step: float, length: float, measure: float) -> float:
+        first = FIRST_STEP * self.stepper.unit
         grow = min(2.0, max(0.5, 1.0 / max(measure, 1e-300)))
+        # Of two descriptions of a structure errors differ by rounding, which lengths in proportion to them would pass on.
+        grown = first * 2.0 ** (np.rint(LENGTHS * np.log2(grow * length / first)) / LENGTHS)
         if grow <= 1.0:
-            return max(grow * length, min(length, FIRST_STEP * self.stepper.unit))
+            return max(grown, min(length, first))
         # A step that was cut at its target does not shorten the next.
-        return min(LONGEST_STEP * self.stepper.unit, max(step if length < 0.99 * step else 0.0, grow * length))
+        return min(LONGEST_STEP * self.stepper.unit, max(step if length < 0.99 * step else 0.0, grown))
 
     def _on_path(self, state: PathState, new: Place, moved: float, refining: bool) -> Place | None:
         """The place of the path at a new one, which is in equilibrium where blocks are fast or a collapse is enclosed.
