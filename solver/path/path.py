@@ -457,7 +457,7 @@ class Path:
     def _next_step(self, step: float, length: float, measure: float) -> float:
         first = FIRST_STEP * self.stepper.unit
         grow = min(2.0, max(0.5, 1.0 / max(measure, 1e-300)))
-        # Of two descriptions of a structure errors differ by rounding, which lengths in proportion to them would pass on.
+        # Errors of two descriptions differ by rounding, which lengths in proportion to them would pass on.
         grown = first * 2.0 ** (np.rint(LENGTHS * np.log2(grow * length / first)) / LENGTHS)
         if grow <= 1.0:
             return max(grown, min(length, first))
