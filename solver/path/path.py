@@ -577,7 +577,9 @@ class Path:
         first, bounds = self.checks.bounds(unloaded), self.checks.bounds(beyond, CLOSING_GAP)
         # The multiplier of a place may be one that viscosity carries; that of its check is not.
         vanishes = check.measured <= VANISHING * first.high
-        return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None
+        # Of a bound a little before zero, too: viscosity carries there what equilibrium does not.
+        falls = bounds.in_equilibrium and bounds.high <= max(check.measured, 0.0)
+        return min(bounds.high, 0.0) if vanishes and falls else None
 
     def _reaction(self, place: Place) -> float:
         """Reaction of the forces of a place [N or N·m]."""

@@ -322,7 +322,7 @@ def test_piers_that_stand_on_a_corner_come_to_rest():
     sinks = solver.Settlement((0, 0, -1), increment=5e-4, limit=2e-3)
     response = solver.Structure(church_bay(pier=0.8), friction_coefficient=0.6).settle(sinks)
     assert response.stop is solver.Status.LIMIT_REACHED
-    assert max(increment.programs for increment in response.path) < 150
+    assert max(increment.programs for increment in response.path) < 250
 
 
 @pytest.mark.slow
