@@ -97,6 +97,7 @@ def test_a_folder_whose_name_is_not_utf_8(case, tmp_path):
     assert record["case_file"] == str(folder / "case.toml")
 
 
+@pytest.mark.thorough
 def test_what_could_not_be_written_is_named(case, tmp_path, capsys, monkeypatch):
     """By its own name, no temporary one, and a run that goes on says how to go on again."""
     assert run_command(case, "-o", tmp_path / "out", "--no-pictures", "--no-check-steps") == 0

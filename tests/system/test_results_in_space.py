@@ -606,6 +606,7 @@ def test_the_film_has_the_path_and_the_fall(tmp_path):
     assert told[-1][0] == told[-1][1] == len(told)
 
 
+@pytest.mark.thorough
 def test_page_has_what_its_script_draws(tmp_path):
     response = vault_response()
     text = write_report(response, tmp_path / "report.html").read_text(encoding="utf-8")

@@ -160,6 +160,7 @@ def test_running_bond_with_joints_of_any_thickness(joints, courses, turn):
     assert total_area(closing.outlines) == pytest.approx(union.area, rel=1e-7)
 
 
+@pytest.mark.thorough
 @given(st.floats(1e-3, 1e3), st.floats(-1e4, 1e4))
 @settings(max_examples=20, deadline=None)
 def test_closing_follows_the_size_and_place_of_the_drawing(scale, shift):

@@ -72,7 +72,7 @@ def test_axles_move_together_and_are_told_by_the_first(tmp_path):
     assert blockvis.open_results(tmp_path / "out").loads.live.sum(axis=0)[1] == pytest.approx(-1500.0)
 
 
-@pytest.mark.parametrize(("sense", "end"), [(1, "the last"), (-1, "the first")])
+@pytest.mark.parametrize(("sense", "end"), [(1, "the last"), pytest.param(-1, "the first", marks=pytest.mark.thorough)])
 def test_a_lowest_load_at_an_end_and_what_its_picture_leaves_out_are_told(tmp_path, capsys, sense, end):
     """A block that overhangs its ground by 1 m carries the less the farther out the load is."""
     near, far = sorted([-1.5 * sense, 0.0]), sorted([-1.5 * sense, 1.0 * sense])

@@ -83,6 +83,7 @@ def test_an_assembly_is_shown_block_by_block():
     assert rows["weight"] == "19.62 kN"
 
 
+@pytest.mark.thorough
 def test_limit_loads_are_shown_and_written_as_responses_are(tmp_path):
     """A limit load and an envelope ended in an AttributeError where only some of the functions knew them."""
     arch = solver.Structure(generators.arch(voussoirs=4), friction_coefficient=0.7)

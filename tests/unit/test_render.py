@@ -526,6 +526,7 @@ def test_frames_of_the_fall_end_where_nothing_moves():
     assert frames_of(resting)[1] == frames_of(falling)[1]
 
 
+@pytest.mark.thorough
 def test_the_film_has_the_tints_and_dots_of_the_mechanism(tmp_path):
     response = arch_response()
     picture = pixels(draw_mechanism(response, tmp_path / "mechanism.png", size=(1280, 720)))

@@ -154,6 +154,7 @@ def test_a_leaning_block_is_held_by_a_prop_with_the_force_of_its_geometry():
     assert -first.ties.forces[0] > 0.05 * weight
 
 
+@pytest.mark.thorough
 def test_a_tie_adds_its_strength_times_its_arm_to_the_acceleration_that_overturns():
     for strength in (500.0, 250.0):
         tie = Tie("tie", (1, None), ((0, 2.5), (-2, 2.5)), 1e6, strength=strength)
